@@ -1,0 +1,1 @@
+"""The program that flies: cameras, autopilot link, Zenoh, configuration, command line."""

@@ -1,0 +1,1 @@
+"""The workshop with torch: networks, datasets, training, evaluation, export."""

@@ -1,0 +1,1 @@
+"""Monocular obstacle awareness for drones: the perception library."""

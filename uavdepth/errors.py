@@ -1,0 +1,35 @@
+"""Errors of the library. Each names the value and the limit in its text."""
+
+from __future__ import annotations
+
+
+class UavDepthError(Exception):
+    """Base of every error that this project raises on purpose: its text is fit to show a user."""
+
+
+class CameraModelError(UavDepthError, ValueError):
+    """Intrinsics or a mount that no camera can have."""
+
+
+class ImageSizeError(UavDepthError, ValueError):
+    """An image or depth map whose size is not the camera's."""
+
+
+class ModelCardError(UavDepthError, ValueError):
+    """A network file without a card, or with a card that lacks a key or holds an impossible value."""
+
+
+class ModelFileError(UavDepthError):
+    """A network file that is missing or that ONNX Runtime cannot load."""
+
+
+class DepthCodecError(UavDepthError, ValueError):
+    """A depth picture that cannot be encoded or decoded."""
+
+
+class ScanError(UavDepthError, ValueError):
+    """Settings or input that the obstacle scanner cannot work with."""
+
+
+class SceneError(UavDepthError, ValueError):
+    """A rendered scene that is unknown or cannot be built on this platform."""
