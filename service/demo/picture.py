@@ -1,0 +1,60 @@
+"""The demo's picture: what the camera saw, what the network made of it, and the scan, side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from service.demo.radar import BACKGROUND_BGR, TEXT_BGR, draw_radar
+from uavdepth.depth_codec import colorize_depth
+from uavdepth.obstacle_scan import ObstacleScan
+
+PANEL_HEIGHT_PX = 360
+_CAPTION_PX = 44
+_GAP_PX = 8
+
+
+def draw_side_by_side(
+    image_bgr: NDArray[np.uint8],
+    depth_m: NDArray[np.float32],
+    scan: ObstacleScan | None,
+    near_m: float,
+    far_m: float,
+) -> NDArray[np.uint8]:
+    """Camera, depth and sector radar in one row, each under its caption.
+
+    Args:
+        image_bgr: (H, W, 3) uint8 camera picture.
+        depth_m: (H, W) float32 z-depth in metres, NaN where unknown.
+        scan: the scan made of it, or None.
+        near_m, far_m: ends of the depth colours in metres; lighter = nearer.
+
+    Returns:
+        (h, w, 3) uint8 BGR.
+    """
+    panels = [
+        _panel(image_bgr, "camera"),
+        _panel(colorize_depth(depth_m, near_m, far_m), f"depth, lighter = nearer ({near_m:g} to {far_m:g} m)"),
+        _panel(draw_radar(scan, PANEL_HEIGHT_PX), "scan, nose up"),
+    ]
+    return _join(panels)
+
+
+def _panel(picture: NDArray[np.uint8], caption: str) -> NDArray[np.uint8]:
+    height, width = picture.shape[:2]
+    scaled_width = max(1, round(width * PANEL_HEIGHT_PX / height))
+    shown = cv2.resize(picture, (scaled_width, PANEL_HEIGHT_PX), interpolation=cv2.INTER_LINEAR)
+    bar = np.full((_CAPTION_PX, scaled_width, 3), BACKGROUND_BGR, np.uint8)
+    cv2.putText(bar, caption, (8, 29), cv2.FONT_HERSHEY_SIMPLEX, 0.6, TEXT_BGR, 1, cv2.LINE_AA)
+    return np.vstack([bar, np.asarray(shown, np.uint8)])
+
+
+def _join(panels: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
+    gap = np.full((panels[0].shape[0], _GAP_PX, 3), BACKGROUND_BGR, np.uint8)
+    row = [panels[0]]
+    for panel in panels[1:]:
+        row += [gap, panel]
+    return np.hstack(row)
