@@ -14,7 +14,8 @@ GroundHeight = Callable[[ArrayLike, ArrayLike], NDArray[np.float64]]
 """Height of the bare ground in metres, up positive, for north and east in metres (any equal shapes)."""
 
 TextureMaker = Callable[[np.random.Generator], NDArray[np.uint8]]
-"""Paints one tileable (S, S, 3) uint8 BGR picture, S a power of two."""
+"""Paints one tileable (S, S, 3) uint8 BGR picture, S a power of two, or (S, S, 4) where the fourth channel
+is gloss: 0 dull, 255 reflects the sky as glass or water does."""
 
 Color = tuple[float, float, float]
 """Blue, green, red. Colours of light are linear factors: 1.0 shows a texture as it was painted."""
@@ -41,7 +42,8 @@ class SceneDescription:
     """One world before it is loaded into the renderer.
 
     Args:
-        mesh: triangles in NED metres. The triangles need no common winding: surfaces are two-sided.
+        mesh: triangles in NED metres. Surfaces are drawn on both sides; closed solids should wind their
+            faces so that cross(v1 - v0, v2 - v0) points outwards (used to tell inside from outside).
         ground_height_m: height of bare ground (no objects), up positive.
         sun_direction_ned: (3,) unit vector towards the sun; its down component is negative by day.
         sun_bgr: light of the sun on a surface that faces it, about 0.8 to 1.3.
