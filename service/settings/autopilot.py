@@ -1,0 +1,107 @@
+"""`[autopilot]`: the MAVLink link, what is asked of it and how old its words may be."""
+
+from __future__ import annotations
+
+from pydantic import Field, field_validator
+
+from service.autopilot.endpoint import parse_endpoint
+from service.errors import LinkError
+from service.settings.section import Section
+
+
+class AutopilotSettings(Section):
+    """The MAVLink link, what is asked of it and how old its words may be."""
+
+    endpoint: str = Field(
+        default="udp:0.0.0.0:14550",
+        title="Endpoint",
+        description='`"udp:HOST:PORT"` listens, `"udpout:HOST:PORT"` sends there, `"tcp:HOST:PORT"` connects, '
+        '`"serial:DEVICE:BAUD"` opens a port, e.g. `"serial:/dev/ttyAMA0:921600"`. Always MAVLink 2.',
+    )
+    system_id: int = Field(
+        default=0,
+        ge=0,
+        le=255,
+        title="System id",
+        description="Vehicle to listen to; 0 learns it from the first autopilot's HEARTBEAT.",
+    )
+    obstacle_rate_hz: float = Field(
+        default=15.0,
+        ge=10.0,
+        le=30.0,
+        title="OBSTACLE_DISTANCE rate, hertz",
+        description="At most this many messages a second, each made from a new frame. ArduPilot needs one "
+        "every 0.5 s, and stops later the slower they come.",
+    )
+    max_frame_age_s: float = Field(
+        default=0.3,
+        ge=0.05,
+        le=0.4,
+        title="Oldest frame, seconds",
+        description="A scan whose picture is older than this is never sent.",
+    )
+    attitude_rate_hz: float = Field(
+        default=50.0,
+        ge=10.0,
+        le=200.0,
+        title="ATTITUDE rate, hertz",
+        description="Asked with SET_MESSAGE_INTERVAL, checked by what arrives, asked again.",
+    )
+    position_rate_hz: float = Field(
+        default=30.0,
+        ge=5.0,
+        le=100.0,
+        title="LOCAL_POSITION_NED rate, hertz",
+        description="Asked like ATTITUDE.",
+    )
+    rangefinder_rate_hz: float = Field(
+        default=20.0,
+        ge=5.0,
+        le=50.0,
+        title="DISTANCE_SENSOR rate, hertz",
+        description="Asked like ATTITUDE; only the downward one (orientation 25) gives the height.",
+    )
+    timesync_rate_hz: float = Field(
+        default=1.0,
+        ge=0.2,
+        le=5.0,
+        title="TIMESYNC rate, hertz",
+        description="Round trips that bind the autopilot's clock to this computer's.",
+    )
+    heartbeat_timeout_s: float = Field(
+        default=3.0,
+        ge=1.5,
+        le=10.0,
+        title="Link loss, seconds",
+        description="The link counts as lost when the autopilot has been silent for this long.",
+    )
+    attitude_gap_s: float = Field(
+        default=0.2,
+        ge=0.05,
+        le=0.5,
+        title="Widest gap, seconds",
+        description="Attitude and position are not interpolated between messages further apart than this.",
+    )
+    extrapolation_s: float = Field(
+        default=0.05,
+        ge=0.0,
+        le=0.1,
+        title="Extrapolation, seconds",
+        description="How far beyond the newest message attitude and position are carried by their rates.",
+    )
+    height_timeout_s: float = Field(
+        default=0.5,
+        ge=0.1,
+        le=2.0,
+        title="Oldest height, seconds",
+        description="A rangefinder reading further than this from the frame's capture is not used.",
+    )
+
+    @field_validator("endpoint")
+    @classmethod
+    def _endpoint_is_known(cls, value: str) -> str:
+        try:
+            parse_endpoint(value)
+        except LinkError as error:
+            raise ValueError(str(error)) from error
+        return value
