@@ -146,7 +146,7 @@ def _is_clear(scene: World, control: NDArray[np.float64], duration_s: float) -> 
         # Clearance shrinks no faster than the vehicle moves, so far from things most samples need no query.
         margin -= step
         if margin < CLEARANCE_M + 0.05:
-            margin = scene.clearance_m(position)
+            margin = scene.clearance_m(position.tolist())
             if margin < CLEARANCE_M + 0.05:
                 return False
         height = -position[2] - scene.ground_height_m(position[0], position[1])

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from uavdepth.scenes.description import SceneDescription
 
 STEP_S = 0.5
 """Time between the control points of a flight's splines."""
@@ -29,10 +32,10 @@ class World(Protocol):
     """What the planner asks a scene."""
 
     @property
-    def extent_m(self) -> float: ...
+    def description(self) -> SceneDescription: ...
     def ground_height_m(self, north_m: float, east_m: float) -> float: ...
     def ray_distance_m(self, origin_ned_m: ArrayLike, direction_ned: ArrayLike) -> NDArray[np.floating]: ...
-    def clearance_m(self, position_ned_m: ArrayLike) -> float: ...
+    def clearance_m(self, position_ned_m: Sequence[float]) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,7 @@ class PathGrower:
         self._world = world
         self._rng = rng
         self._habit = Habit.draw(rng)
-        self._reach = 0.9 * world.extent_m
+        self._reach = 0.9 * world.description.extent_m
         self._goal_rad = 0.0
         self._goal_age = 0
 
@@ -132,7 +135,7 @@ class PathGrower:
             if weight.sum() <= 0:
                 return None
             pick = int(rng.choice(len(places), p=weight / weight.sum()))
-            if world.clearance_m(places[pick]) > _MARGIN_M:
+            if world.clearance_m(places[pick].tolist()) > _MARGIN_M:
                 return np.array(places[pick])
             weight[pick] = 0.0
         return None
@@ -216,7 +219,7 @@ class PathGrower:
             height = -point[2] - self._world.ground_height_m(point[0], point[1])
             if not MIN_HEIGHT_M + 0.1 < height < MAX_HEIGHT_M - 0.5:
                 return False
-        return all(self._world.clearance_m(point) > _MARGIN_M for point in points)
+        return all(self._world.clearance_m(point.tolist()) > _MARGIN_M for point in points)
 
     def _leaves(self, here: NDArray[np.float64]) -> bool:
         ahead = here[:2] + 6.0 * np.array([math.cos(self._goal_rad), math.sin(self._goal_rad)])
