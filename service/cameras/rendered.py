@@ -1,0 +1,94 @@
+"""The rendered camera: the world of a scene, seen from where the autopilot says it is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+from service.cameras.camera import Camera, CameraTimeoutError
+from service.clock import Clock
+from service.errors import CameraError
+from service.frame import Frame
+from service.settings.camera import CameraSettings
+from service.telemetry import Telemetry
+from uavdepth.camera import CameraMount
+
+if TYPE_CHECKING:
+    from uavdepth.scenes import Scene
+
+_POLL_S = 0.005
+"""How often a pose is looked for: far below the 20 ms between two poses of a 50 Hz stream."""
+
+
+class PoseSource(Protocol):
+    """Who knows where the vehicle is."""
+
+    def newest_pose(self) -> Telemetry:
+        """The newest known pose and the time it holds for."""
+
+    def telemetry_at(self, captured_ns: int) -> Telemetry:
+        """The vehicle at a moment in the recent past."""
+
+
+class RenderedCamera(Camera):
+    """Renders from the pose that the connected autopilot reports, so that any autopilot flies in the scene.
+
+    A frame's capture stamp is the time for which its pose holds; rendering counts as delivery.
+
+    Args:
+        spec: `SCENE` or `SCENE:SEED`.
+        mount: where the camera sits.
+        poses: the autopilot link.
+    """
+
+    reopen_on_timeout = False
+
+    def __init__(
+        self, settings: CameraSettings, clock: Clock, spec: str, mount: CameraMount, poses: PoseSource
+    ) -> None:
+        super().__init__(settings, clock)
+        self._spec = spec
+        self._mount = mount
+        self._poses = poses
+        self._scene: Scene | None = None
+        self._due_ns = 0
+        self._last_pose_ns = -1
+        self._model = settings.model
+
+    def open(self) -> None:
+        if self._scene is None:
+            from uavdepth.scenes import load_scene, parse_scene
+
+            self._scene = load_scene(*parse_scene(self._spec))
+        self._due_ns = self._clock.now_ns()
+
+    def read(self, timeout_s: float) -> Frame:
+        if self._scene is None:
+            raise CameraError(f"camera {self.name}: not open")
+        self._wait((self._due_ns - self._clock.now_ns()) / 1e9)
+        pose = self._fresh_pose(timeout_s)
+        if pose.position_ned_m is None or pose.attitude is None:
+            raise CameraError(f"camera {self.name}: a pose without position or attitude")
+        # A late picture does not make the following ones hurry.
+        self._due_ns = max(self._due_ns, self._clock.now_ns()) + round(1e9 / self.settings.fps)
+        self._last_pose_ns = pose.at_ns
+        picture = self._scene.render(self._model, self._mount, pose.position_ned_m, pose.attitude)
+        return self._frame(picture.image_bgr, pose.at_ns)
+
+    def _fresh_pose(self, timeout_s: float) -> Telemetry:
+        """A pose that is newer than the last picture's and whole."""
+        end_ns = self._clock.now_ns() + round(timeout_s * 1e9)
+        while True:
+            newest = self._poses.newest_pose()
+            if newest.at_ns > self._last_pose_ns:
+                pose = self._poses.telemetry_at(newest.at_ns)
+                if pose.position_ned_m is not None and pose.attitude is not None:
+                    return pose
+            if self._clock.now_ns() >= end_ns:
+                raise CameraTimeoutError(
+                    f"camera {self.name}: waits for the autopilot's position and attitude "
+                    "(LOCAL_POSITION_NED, ATTITUDE)"
+                )
+            self._wait(_POLL_S)
+
+    def close(self) -> None:
+        self._due_ns = 0

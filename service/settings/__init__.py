@@ -1,0 +1,40 @@
+"""The configuration: one TOML file, one strict model a section, one root."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from service.settings.autopilot import AutopilotSettings
+from service.settings.camera import CameraSettings
+from service.settings.log import LogSettings
+from service.settings.model import ModelSettings
+from service.settings.mount import MountSettings
+from service.settings.scan import ScanSettings
+from service.settings.section import Section
+from service.settings.vehicle import VehicleSettings
+from service.settings.zenoh import ZenohSettings
+
+__all__ = [
+    "AutopilotSettings",
+    "CameraSettings",
+    "LogSettings",
+    "ModelSettings",
+    "MountSettings",
+    "ScanSettings",
+    "Settings",
+    "VehicleSettings",
+    "ZenohSettings",
+]
+
+
+class Settings(Section):
+    """The whole configuration. Only `[camera] source` has no default."""
+
+    camera: CameraSettings
+    vehicle: VehicleSettings = Field(default_factory=VehicleSettings)
+    mount: MountSettings = Field(default_factory=MountSettings)
+    model: ModelSettings = Field(default_factory=ModelSettings)
+    scan: ScanSettings = Field(default_factory=ScanSettings)
+    autopilot: AutopilotSettings = Field(default_factory=AutopilotSettings)
+    zenoh: ZenohSettings = Field(default_factory=ZenohSettings)
+    log: LogSettings = Field(default_factory=LogSettings)

@@ -1,0 +1,41 @@
+"""`[model]`: the depth network and what runs it."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from service.settings.section import Section
+
+
+class ModelSettings(Section):
+    """The depth network and what runs it."""
+
+    path: str = Field(
+        default="default",
+        min_length=1,
+        title="Network",
+        description="`default` for the weights inside the package, or the path of an ONNX file "
+        "with a model card.",
+    )
+    provider: Literal["auto", "cpu", "cuda", "tensorrt", "openvino"] = Field(
+        default="auto",
+        title="ONNX Runtime provider",
+        description="What computes the network; `auto` takes the best one that is installed.",
+    )
+    threads: int | None = Field(
+        default=None,
+        ge=1,
+        le=64,
+        title="Threads of the network",
+        description="Processor threads that inference may use; left out, ONNX Runtime chooses.",
+    )
+    max_relative_sigma: float = Field(
+        default=0.5,
+        gt=0.0,
+        le=10.0,
+        title="Largest uncertainty of a pixel",
+        description="Pixels whose standard deviation over depth is larger count as unknown. "
+        "Only networks with an uncertainty output have it.",
+    )

@@ -1,0 +1,67 @@
+"""`[scan]`: which obstacles count."""
+
+from __future__ import annotations
+
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from service.settings.section import Section
+
+
+class ScanSettings(Section):
+    """Which obstacles count, and when depth is trusted."""
+
+    min_distance_m: float = Field(
+        default=0.2,
+        ge=0.05,
+        le=5.0,
+        title="Nearest distance, metres",
+        description="Sent as OBSTACLE_DISTANCE.min_distance; nearer obstacles are reported just above it. "
+        "Keep it small: PX4 treats it as a keep-out radius.",
+    )
+    max_distance_m: float = Field(
+        default=20.0,
+        ge=2.0,
+        le=100.0,
+        title="Farthest distance, metres",
+        description="Sent as OBSTACLE_DISTANCE.max_distance; farther obstacles count as clear. "
+        "Constant while the service runs: PX4 remembers the largest it ever saw.",
+    )
+    below_m: float = Field(
+        default=2.0,
+        ge=0.1,
+        le=50.0,
+        title="Height band below, metres",
+        description="Obstacles count down to so far below the vehicle's flight level.",
+    )
+    above_m: float = Field(
+        default=1.5,
+        ge=0.1,
+        le=50.0,
+        title="Height band above, metres",
+        description="Obstacles count up to so far above the vehicle's flight level.",
+    )
+    max_scale_sigma: float = Field(
+        default=0.5,
+        gt=0.0,
+        le=1.0,
+        title="Largest uncertainty of the scale",
+        description="Relative standard deviation of the metric scale above which no distances are sent.",
+    )
+    scale_hold_s: float = Field(
+        default=2.0,
+        ge=0.0,
+        le=30.0,
+        title="Time that a scale is kept, seconds",
+        description="How long the last metric scale holds when no ground is seen; after it nothing is sent.",
+    )
+
+    @model_validator(mode="after")
+    def _is_a_range(self) -> Self:
+        if self.max_distance_m <= self.min_distance_m + 1.0:
+            raise ValueError(
+                f"max_distance_m: {self.max_distance_m:g} must be at least 1 m above "
+                f"min_distance_m {self.min_distance_m:g}"
+            )
+        return self
