@@ -54,7 +54,9 @@ class CameraModel:
                 raise CameraModelError(f"{name} is {value}: a finite focal length above 0 pixels is needed")
         for name in ("cx", "cy"):
             if not math.isfinite(getattr(self, name)):
-                raise CameraModelError(f"{name} is {getattr(self, name)}: a finite number of pixels is needed")
+                raise CameraModelError(
+                    f"{name} is {getattr(self, name)}: a finite number of pixels is needed"
+                )
         if len(self.distortion) not in _DISTORTION_LENGTHS:
             raise CameraModelError(
                 f"distortion has {len(self.distortion)} numbers: OpenCV's model has {_DISTORTION_LENGTHS}"
@@ -72,7 +74,9 @@ class CameraModel:
             horizontal_fov_deg: angle between the image's left and right edges, 1 to 170 degrees.
         """
         if not 1.0 <= horizontal_fov_deg <= 170.0:
-            raise CameraModelError(f"horizontal field of view is {horizontal_fov_deg} deg: 1 to 170 is needed")
+            raise CameraModelError(
+                f"horizontal field of view is {horizontal_fov_deg} deg: 1 to 170 is needed"
+            )
         focal = 0.5 * width / math.tan(math.radians(horizontal_fov_deg) / 2)
         return cls(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2)
 
@@ -99,11 +103,7 @@ class CameraModel:
         """(H, W, 3) float32 direction of each pixel centre with z = 1: times z-depth it is the point."""
         u, v = np.meshgrid(np.arange(self.width, dtype=np.float64), np.arange(self.height, dtype=np.float64))
         if any(self.distortion):
-            pixels = np.stack([u, v], axis=-1).reshape(-1, 1, 2)
-            criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-9)
-            flat = cv2.undistortPointsIter(
-                pixels, self.matrix, np.array(self.distortion), np.eye(3), np.eye(3), criteria
-            )
+            flat = _undistorted(np.stack([u, v], axis=-1).reshape(-1, 1, 2), self)
             xy = flat.reshape(self.height, self.width, 2)
         else:
             xy = np.stack([(u - self.cx) / self.fx, (v - self.cy) / self.fy], axis=-1)
@@ -145,10 +145,25 @@ class CameraMount:
     @property
     def body_from_camera(self) -> NDArray[np.float64]:
         """(3, 3) rotation that takes camera-frame vectors into body FRD."""
-        angles = np.radians([self.roll_deg, self.pitch_deg, self.yaw_deg])
-        return rotation_zyx(*angles) @ BODY_FROM_CAMERA_AXES
+        roll, pitch, yaw = (math.radians(angle) for angle in (self.roll_deg, self.pitch_deg, self.yaw_deg))
+        return np.asarray(rotation_zyx(roll, pitch, yaw) @ BODY_FROM_CAMERA_AXES, dtype=np.float64)
 
     @property
     def position_body_m(self) -> NDArray[np.float64]:
         """(3,) camera position in body FRD, metres."""
         return np.array([self.forward_m, self.right_m, self.down_m])
+
+
+def _undistorted(pixels: NDArray[np.float64], camera: CameraModel) -> NDArray[np.float64]:
+    """(N, 1, 2) normalised x, y of (N, 1, 2) pixels of a distorted camera."""
+    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-9)
+    distortion = np.array(camera.distortion)
+    # OpenCV 4 iterates to a criterion in a function of its own; OpenCV 5 folded it into undistortPoints.
+    iterated = getattr(cv2, "undistortPointsIter", None)
+    if iterated is not None:
+        flat = iterated(pixels, camera.matrix, distortion, np.eye(3), np.eye(3), criteria)
+    else:
+        flat = cv2.undistortPoints(
+            pixels, camera.matrix, distortion, R=np.eye(3), P=np.eye(3), criteria=criteria
+        )
+    return np.asarray(flat, dtype=np.float64)
