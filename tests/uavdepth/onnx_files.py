@@ -1,0 +1,86 @@
+"""Small ONNX networks with known answers, in place of trained weights."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnx
+from onnx import TensorProto, helper, numpy_helper
+
+from uavdepth.model_card import CARD_METADATA_KEY
+
+WIDTH, HEIGHT = 48, 32
+MEAN, STD = [0.485, 0.456, 0.406], [0.229, 0.224, 0.225]
+
+
+def card_values(**changes: Any) -> dict[str, Any]:
+    """A complete card as a dict; a change to None takes the key away."""
+    values: dict[str, Any] = {
+        "card_version": 1,
+        "name": "test network",
+        "input_width": WIDTH,
+        "input_height": HEIGHT,
+        "mean": MEAN,
+        "std": STD,
+        "output": "log_inverse_depth",
+        "metric": True,
+        "uncertainty": False,
+        "focal_px": 40.0,
+        "max_depth_m": 100.0,
+        "training_data": "none",
+        "licence": "Apache-2.0",
+        "measured": {"abs_rel": 0.1},
+        "created": "2026-11-22T00:00:00Z",
+    }
+    values.update(changes)
+    return {key: value for key, value in values.items() if value is not None}
+
+
+def write_red_network(
+    path: Path,
+    card: dict[str, Any] | None,
+    *,
+    uncertainty: float | None = None,
+    width: int = WIDTH,
+    height: int = HEIGHT,
+    gain: float = 1.0,
+) -> Path:
+    """A network whose output is `gain` times its normalised red channel, log sigma a constant.
+
+    Args:
+        path: the file to write.
+        card: the card to put into the metadata, or None for none.
+        uncertainty: log of relative sigma, or None for a network without that output.
+        width, height: size of the graph's input.
+    """
+    picture = helper.make_tensor_value_info("image", TensorProto.FLOAT, [1, 3, height, width])
+    depth = helper.make_tensor_value_info("log_inverse_depth", TensorProto.FLOAT, [1, 1, height, width])
+    constants = [
+        numpy_helper.from_array(np.array([0], dtype=np.int64), "first"),
+        numpy_helper.from_array(np.array([gain], dtype=np.float32), "gain"),
+    ]
+    nodes = [
+        helper.make_node("Gather", ["image", "first"], ["red"], axis=1),
+        helper.make_node("Mul", ["red", "gain"], ["log_inverse_depth"]),
+    ]
+    outputs = [depth]
+    if uncertainty is not None:
+        constants += [
+            numpy_helper.from_array(np.array([0.0], dtype=np.float32), "zero"),
+            numpy_helper.from_array(np.array([uncertainty], dtype=np.float32), "sigma"),
+        ]
+        nodes += [
+            helper.make_node("Mul", ["red", "zero"], ["nothing"]),
+            helper.make_node("Add", ["nothing", "sigma"], ["log_sigma"]),
+        ]
+        outputs.append(helper.make_tensor_value_info("log_sigma", TensorProto.FLOAT, [1, 1, height, width]))
+    graph = helper.make_graph(nodes, "red", [picture], outputs, constants)
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)])
+    model.ir_version = 8
+    if card is not None:
+        helper.set_model_props(model, {CARD_METADATA_KEY: json.dumps(card)})
+    onnx.save(model, str(path))
+    return path
