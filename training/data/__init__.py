@@ -1,0 +1,1 @@
+"""Training pictures with exact depth: rendering, storage, augmentation and batches."""

@@ -1,0 +1,25 @@
+"""Errors of the workshop. Each names the value and the limit in its text."""
+
+from __future__ import annotations
+
+from uavdepth.errors import UavDepthError
+
+
+class PretrainedWeightsError(UavDepthError):
+    """ImageNet weights that are missing or do not fit the encoder."""
+
+
+class TrainingDataError(UavDepthError, ValueError):
+    """A folder of training frames that is missing, empty or broken."""
+
+
+class TrainingSettingsError(UavDepthError, ValueError):
+    """Training settings that contradict each other."""
+
+
+class CheckpointError(UavDepthError):
+    """A checkpoint that is missing, broken or of another network."""
+
+
+class ExportError(UavDepthError):
+    """An exported file whose output is not the network's."""

@@ -1,0 +1,1 @@
+"""The depth network: light encoder, feature aggregation nodes, decoder with channel attention."""
