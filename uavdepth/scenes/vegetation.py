@@ -268,3 +268,33 @@ def _dead(
             "bark",
             np.ones(3),
         )
+
+
+def add_tuft(builder: MeshBuilder, rng: np.random.Generator, height_m: float, texture: str = "grass") -> None:
+    """Grow one tuft of grass or fern at the origin: blades that lean outwards."""
+    blades = 9
+    heading = rng.uniform(0.0, 2 * np.pi, blades)
+    out = np.column_stack([np.cos(heading), np.sin(heading), np.zeros(blades)])
+    side = np.column_stack([-out[:, 1], out[:, 0], np.zeros(blades)]) * 0.13 * height_m
+    root = out * 0.08 * height_m
+    lean = rng.uniform(0.3, 0.9, (blades, 1)) * height_m
+    tip = root + out * lean - np.array([0.0, 0.0, 1.0]) * height_m * rng.uniform(0.6, 1.0, (blades, 1))
+    corners = np.stack([root - side, root + side, tip], axis=1).reshape(-1, 3)
+    faces = np.arange(3 * blades).reshape(-1, 3)
+    builder.add(
+        corners, faces, box_uv(corners, faces), texture, rng.uniform(0.7, 1.2, (blades, 1)) * np.ones(3)
+    )
+
+
+def add_far_tree(builder: MeshBuilder, rng: np.random.Generator, height_m: float, conifer: bool) -> None:
+    """Grow a tree of few triangles at the origin, for where it is only seen from afar."""
+    crown = "needles" if conifer else "leaves"
+    lift = np.array([0.0, 0.0, -(0.55 if conifer else 0.62) * height_m])
+    width = (0.16 if conifer else 0.24) * height_m
+    vertices, faces = lumpy_sphere(rng, 1, (width, width, (0.47 if conifer else 0.36) * height_m), 0.2, 0.08)
+    if conifer:
+        taper = 0.25 + 0.75 * (vertices[:, 2:] / (0.47 * height_m) + 1.0) / 2
+        vertices = vertices * np.where([True, True, False], taper * 1.5, 1.0)
+    builder.add(vertices + lift, faces, box_uv(vertices, faces), crown, _leaf_tint(rng, 0.0))
+    line = np.array([[0.0, 0.0, _ROOT_DEPTH_M], [0.0, 0.0, -0.5 * height_m]])
+    _add_tube(builder, line, [0.02 * height_m, 0.014 * height_m], 4, "bark", np.ones(3))

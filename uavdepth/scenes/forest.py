@@ -1,0 +1,267 @@
+"""The scene `forest`: trees of many kinds on flat ground, undergrowth, fallen logs, a trail and a clearing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from uavdepth.scenes.copies import Template, add_copies
+from uavdepth.scenes.description import SceneDescription
+from uavdepth.scenes.mesh import MeshBuilder
+from uavdepth.scenes.rocks import add_boulder
+from uavdepth.scenes.terrain import LandNoise, Values, fractal_land, stretched_axis
+from uavdepth.scenes.vegetation import (
+    TreeKind,
+    add_bush,
+    add_far_tree,
+    add_log,
+    add_tree,
+    add_tuft,
+)
+from uavdepth.scenes.weather import draw_weather
+
+_EXTENT_M = 68.0
+_PLANTED_M = 78.0
+_FAR_M = 190.0
+_GROUND_REACH_M = 600.0
+_CORRIDOR_HALF_WIDTH_M = 3.2
+_CLEARING_M = 5.0
+_WALL_HALF_WIDTH_M = 14.0
+
+
+@dataclass(frozen=True)
+class _Wood:
+    """What grows in one kind of forest.
+
+    Args:
+        kinds: tree kinds and their shares.
+        floors: textures of the ground, the first where the noise is lowest.
+        autumn: share of coloured leaves.
+        spacing_m: mean distance between trees.
+    """
+
+    kinds: dict[TreeKind, float]
+    floors: tuple[str, str, str]
+    autumn: float
+    spacing_m: tuple[float, float]
+
+
+_WOODS = (
+    _Wood(
+        {"broadleaf": 0.75, "birch": 0.12, "dead": 0.05, "conifer": 0.08},
+        ("grass", "leaf_litter", "moss"),
+        0.05,
+        (4.4, 6.0),
+    ),
+    _Wood(
+        {"conifer": 0.85, "birch": 0.08, "dead": 0.07},
+        ("moss", "needle_floor", "needle_floor"),
+        0.0,
+        (3.8, 5.2),
+    ),
+    _Wood({"birch": 0.65, "broadleaf": 0.2, "conifer": 0.15}, ("grass", "grass", "moss"), 0.25, (4.0, 5.6)),
+    _Wood(
+        {"broadleaf": 0.6, "birch": 0.25, "poplar": 0.1, "dead": 0.05},
+        ("leaf_litter", "leaf_litter", "soil"),
+        0.8,
+        (4.4, 6.0),
+    ),
+    _Wood(
+        {"conifer": 0.4, "broadleaf": 0.4, "poplar": 0.1, "birch": 0.1},
+        ("needle_floor", "leaf_litter", "grass"),
+        0.1,
+        (4.2, 5.6),
+    ),
+    _Wood({"snowy_conifer": 0.75, "dead": 0.25}, ("snow", "snow", "needle_floor"), 0.0, (4.0, 5.6)),
+)
+_WOOD_SHARES = (0.22, 0.2, 0.17, 0.14, 0.17, 0.1)
+
+
+def build(seed: int) -> SceneDescription:
+    """The forest of one seed."""
+    rng = np.random.default_rng([seed, 0xF0E])
+    wood = _WOODS[int(rng.choice(len(_WOODS), p=_WOOD_SHARES))]
+    wall_north_m = rng.uniform(33.0, 39.0)
+    builder = MeshBuilder()
+    _add_floor(builder, rng, wood)
+    _add_trees(builder, rng, wood, wall_north_m)
+    if rng.random() < 0.35:
+        _add_rock_bank(builder, rng, wall_north_m)
+    else:
+        _add_tree_wall(builder, rng, wood, wall_north_m)
+    _add_undergrowth(builder, rng, wood, wall_north_m)
+    _add_far_trees(builder, rng, wood)
+    weather = draw_weather(rng, (0.001, 0.009))
+    return SceneDescription(
+        mesh=builder.build(),
+        ground_height_m=_flat,
+        sun_direction_ned=weather.sun_direction_ned,
+        sun_bgr=weather.sun_bgr,
+        ambient_bgr=weather.ambient_bgr,
+        sky_top_bgr=weather.sky_top_bgr,
+        sky_horizon_bgr=weather.sky_horizon_bgr,
+        haze_per_m=weather.haze_per_m,
+        cloud_amount=weather.cloud_amount,
+        extent_m=_EXTENT_M,
+    )
+
+
+def _flat(north_m: ArrayLike, east_m: ArrayLike) -> Values:
+    return np.zeros(np.broadcast(north_m, east_m).shape)
+
+
+def _trail_east_m(bends: LandNoise, north_m: ArrayLike) -> Values:
+    """The trail's middle line: straight north of the origin, winding south of it."""
+    north = np.asarray(north_m, float)
+    winding = 9.0 * (bends.at(north, np.zeros_like(north)) - bends.at(0.0, 0.0))
+    return np.asarray(np.where(north < 0.0, winding * np.minimum(-north / 12.0, 1.0), 0.0))
+
+
+def _add_floor(builder: MeshBuilder, rng: np.random.Generator, wood: _Wood) -> None:
+    lines = stretched_axis(_EXTENT_M + 12.0, 0.9, _GROUND_REACH_M, growth=1.3)
+    north, east = np.meshgrid(lines, lines, indexing="ij")
+    # Corners off the grid's lines hide the grid where one texture meets another.
+    shake = np.minimum(np.hypot(north, east) < _EXTENT_M + 10.0, True) * rng.uniform(
+        -0.28, 0.28, (2, *north.shape)
+    )
+    vertices = np.stack([north + shake[0], east + shake[1], np.zeros_like(north)], axis=-1).reshape(-1, 3)
+    rows = len(lines)
+    corner = (np.arange(rows - 1)[:, None] * rows + np.arange(rows - 1)[None, :]).ravel()
+    up, right, both = corner + rows, corner + 1, corner + rows + 1
+    faces = np.concatenate([np.stack([corner, both, up], axis=1), np.stack([corner, right, both], axis=1)])
+    middle = vertices[faces].mean(axis=1)
+    patches = fractal_land(rng, middle[:, 0], middle[:, 1], 14.0, 3)
+    low, middling, high = wood.floors
+    texture = np.full(len(faces), middling, dtype="<U16")
+    texture[patches < -0.22] = low
+    texture[patches > 0.3] = high
+    bends = LandNoise(rng, 30.0)
+    off = np.abs(middle[:, 1] - _trail_east_m(bends, middle[:, 0]))
+    if wood.floors[0] != "snow":
+        texture[(off < 1.0 + 0.5 * patches) & (middle[:, 0] < 33.0)] = "soil"
+    tint = np.ones(3) * (1.0 + 0.22 * fractal_land(rng, middle[:, 0], middle[:, 1], 9.0, 3))[:, None]
+    for name in np.unique(texture):
+        part = texture == name
+        builder.add(vertices, faces[part], vertices[:, :2], str(name), tint[part])
+
+
+def _jittered_places(rng: np.random.Generator, reach_m: float, spacing_m: float) -> NDArray[np.float64]:
+    """(K, 2) places about `spacing_m` apart, without rows."""
+    lines = np.arange(-reach_m, reach_m, spacing_m)
+    north, east = np.meshgrid(lines, lines, indexing="ij")
+    places = np.stack([north, east], axis=-1).reshape(-1, 2)
+    return places + rng.uniform(-0.42, 0.42, places.shape) * spacing_m
+
+
+def _is_free(places: NDArray[np.float64], reach_m: ArrayLike, wall_north_m: float) -> NDArray[np.bool_]:
+    """(K,) True where a thing of that reach stands neither in the clearing nor in the corridor or the wall."""
+    north, east = places[:, 0], np.abs(places[:, 1])
+    reach = np.asarray(reach_m, float)
+    clear = np.hypot(north, east) > _CLEARING_M + reach
+    before = (north > -2.0) & (north < wall_north_m + 1.0)
+    corridor = before & (east < _CORRIDOR_HALF_WIDTH_M + reach)
+    wall = (north > wall_north_m - 3.0) & (north < wall_north_m + 9.0) & (east < _WALL_HALF_WIDTH_M + 3.0)
+    return np.asarray(clear & ~corridor & ~wall)
+
+
+def _on_ground(places: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.column_stack([places, np.zeros(len(places))])
+
+
+def _add_trees(builder: MeshBuilder, rng: np.random.Generator, wood: _Wood, wall_north_m: float) -> None:
+    places = _jittered_places(rng, _PLANTED_M, rng.uniform(*wood.spacing_m))
+    glades = LandNoise(rng, 24.0).at(places[:, 0], places[:, 1])
+    places = places[glades + rng.normal(0.0, 0.15, len(places)) > -0.42]
+    heights = np.clip(rng.lognormal(np.log(10.5), 0.34, len(places)), 4.5, 20.0)
+    # Crowns reach as far as a quarter of a tree's height.
+    places_free = _is_free(places, 0.27 * heights, wall_north_m)
+    places, heights = places[places_free], heights[places_free]
+    kinds = list(wood.kinds)
+    species = rng.choice(len(kinds), size=len(places), p=list(wood.kinds.values()))
+    variety = rng.integers(6, size=len(places))
+    for number, kind in enumerate(kinds):
+        for which in range(6):
+            here = (species == number) & (variety == which)
+            if here.any():
+                template = _tree_template(rng, kind, float(rng.uniform(7.0, 14.0)), wood.autumn)
+                add_copies(builder, rng, template, _on_ground(places[here]), heights[here])
+
+
+def _tree_template(rng: np.random.Generator, kind: TreeKind, height_m: float, autumn: float) -> Template:
+    radius = height_m * rng.uniform(0.012, 0.03)
+    return Template.of(
+        lambda builder: add_tree(builder, rng, 0.0, 0.0, 0.0, height_m, kind, radius, autumn), height_m
+    )
+
+
+def _add_tree_wall(builder: MeshBuilder, rng: np.random.Generator, wood: _Wood, north_m: float) -> None:
+    """A stand too dense to fly through: two staggered ranks of young trees, bushes between their feet."""
+    kind: TreeKind = "snowy_conifer" if "snowy_conifer" in wood.kinds else "conifer"
+    for rank in range(3):
+        east = np.arange(-_WALL_HALF_WIDTH_M, _WALL_HALF_WIDTH_M + 0.1, 1.7) + 0.85 * (rank % 2)
+        north = north_m + 1.7 * rank + rng.uniform(-0.4, 0.4, len(east))
+        places = np.column_stack([north, east + rng.uniform(-0.3, 0.3, len(east))])
+        heights = rng.uniform(10.5, 15.0, len(east))
+        which = rng.integers(3, size=len(east))
+        for number in range(3):
+            template = _tree_template(rng, kind, 11.0, 0.0)
+            add_copies(builder, rng, template, _on_ground(places[which == number]), heights[which == number])
+    for east_m in np.arange(-_WALL_HALF_WIDTH_M, _WALL_HALF_WIDTH_M + 0.1, 1.1):
+        place = north_m - 0.4 + rng.uniform(-0.3, 0.5)
+        add_bush(builder, rng, place, east_m, 0.0, rng.uniform(1.6, 2.6), wood.autumn)
+
+
+def _add_rock_bank(builder: MeshBuilder, rng: np.random.Generator, north_m: float) -> None:
+    """A wall of piled rocks about 10 m high."""
+    tint = rng.uniform(0.8, 1.2)
+    for level, spacing in enumerate((2.6, 2.8, 3.2)):
+        for east_m in np.arange(-_WALL_HALF_WIDTH_M, _WALL_HALF_WIDTH_M + 0.1, spacing):
+            size = rng.uniform(5.0, 6.5)
+            place = north_m + 0.4 * size + 0.9 * level + rng.uniform(-0.4, 0.4)
+            add_boulder(builder, rng, place, east_m, -3.1 * level, size, sunk=0.2, tint=tint)
+
+
+def _add_undergrowth(
+    builder: MeshBuilder, rng: np.random.Generator, wood: _Wood, wall_north_m: float
+) -> None:
+    for _ in range(5):
+        height = rng.uniform(0.7, 1.8)
+        bush = Template.of(lambda b, h=height: add_bush(b, rng, 0.0, 0.0, 0.0, h, wood.autumn), height)  # type: ignore[misc]
+        places = rng.uniform(-_PLANTED_M, _PLANTED_M, (int(rng.integers(12, 40)), 2))
+        places = places[_is_free(places, 1.2, wall_north_m)]
+        heights = np.clip(rng.lognormal(0.0, 0.4, len(places)), 0.4, 2.6)
+        add_copies(builder, rng, bush, _on_ground(places), heights)
+    if "snow" not in wood.floors:
+        for _ in range(4):
+            tuft = Template.of(lambda b: add_tuft(b, rng, 0.5, str(rng.choice(["grass", "leaves"]))), 0.5)
+            places = rng.uniform(-_EXTENT_M, _EXTENT_M, (220, 2))
+            places = places[np.abs(places[:, 1]) > 1.5]
+            add_copies(builder, rng, tuft, _on_ground(places), rng.uniform(0.25, 0.7, len(places)))
+    for place in _scattered(rng, int(rng.integers(14, 34)), 4.0, wall_north_m):
+        add_log(builder, rng, place[0], place[1], 0.0, rng.uniform(3.0, 9.0), rng.uniform(0.12, 0.38))
+    for place in _scattered(rng, int(rng.integers(20, 70)), 2.0, wall_north_m):
+        size = float(np.clip(rng.lognormal(-0.1, 0.6), 0.3, 4.0))
+        add_boulder(builder, rng, place[0], place[1], 0.0, size, sunk=rng.uniform(0.25, 0.45))
+
+
+def _scattered(
+    rng: np.random.Generator, count: int, reach_m: float, wall_north_m: float
+) -> NDArray[np.float64]:
+    places = rng.uniform(-_PLANTED_M, _PLANTED_M, (count, 2))
+    return places[_is_free(places, reach_m, wall_north_m)]
+
+
+def _add_far_trees(builder: MeshBuilder, rng: np.random.Generator, wood: _Wood) -> None:
+    """The wood goes on to the horizon."""
+    places = _jittered_places(rng, _FAR_M, 7.5)
+    places = places[np.abs(places).max(axis=1) > _PLANTED_M]
+    conifers = wood.kinds.get("conifer", 0.0) + wood.kinds.get("snowy_conifer", 0.0)
+    which = rng.integers(6, size=len(places))
+    for number in range(6):
+        height = 12.0
+        conifer = bool(rng.random() < conifers)
+        template = Template.of(lambda b, c=conifer: add_far_tree(b, rng, height, c), height)  # type: ignore[misc]
+        here = places[which == number]
+        add_copies(builder, rng, template, _on_ground(here), rng.uniform(8.0, 18.0, len(here)))

@@ -1,0 +1,258 @@
+"""The scene `mountain`: a valley with a river between rock faces, peaks, snow, conifers and boulders."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from uavdepth.scenes.description import SceneDescription
+from uavdepth.scenes.mesh import MeshBuilder
+from uavdepth.scenes.rocks import add_boulder
+from uavdepth.scenes.shapes import box_uv
+from uavdepth.scenes.terrain import LandNoise, TerrainGrid, Values, fractal_land, smooth_step, stretched_axis
+from uavdepth.scenes.vegetation import TreeKind, add_bush, add_tree
+from uavdepth.scenes.weather import draw_weather
+
+_CORE_M, _SPACING_M, _REACH_M = 160.0, 1.5, 1300.0
+_EXTENT_M = 145.0
+_CORRIDOR_HALF_WIDTH_M = 6.0
+_TREES, _BOULDERS, _BUSHES = 330, 260, 60
+
+
+class _Valley:
+    """The shape of the land, before it is sampled.
+
+    Args:
+        rng: source of the shape.
+    """
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self._rng = rng
+        self.cliff_north_m = rng.uniform(32.0, 38.0)
+        self.cliff_height_m = rng.uniform(14.0, 30.0)
+        self.water_m = -rng.uniform(1.0, 2.2)
+        self._river_south_m = rng.uniform(16.0, 38.0)
+        self._river_half_m = rng.uniform(4.0, 8.0)
+        self._bend = rng.uniform(-22.0, 22.0)
+        self._meander = LandNoise(rng, 70.0)
+        self._wiggle = LandNoise(rng, 38.0)
+        self._steepness = rng.uniform(0.35, 0.75)
+        self._peak_m = rng.uniform(45.0, 110.0)
+
+    def river_north_m(self, east_m: ArrayLike) -> Values:
+        """The river's middle line."""
+        east = np.asarray(east_m, float)
+        meander = 9.0 * self._meander.at(np.zeros_like(east), east)
+        return np.asarray(-self._river_south_m + meander + self._bend * (east / 100.0) ** 2)
+
+    def river_half_m(self, east_m: ArrayLike) -> Values:
+        """Half the river's width."""
+        east = np.asarray(east_m, float)
+        return np.asarray(
+            self._river_half_m * (1.0 + 0.25 * self._meander.at(np.full_like(east, 300.0), east))
+        )
+
+    def height_m(self, north: Values, east: Values) -> Values:
+        """Heights of land and river bed, 0 at the origin."""
+        rng = self._rng
+        across = north - self._bend * (east / 100.0) ** 2
+        away = 1.0 - np.exp(-((east / 18.0) ** 2))
+        foot = self.cliff_north_m + 12.0 * away * self._wiggle.at(np.zeros_like(east), east)
+        tall = self.cliff_height_m * (1.0 + away * 0.9 * self._wiggle.at(np.full_like(east, 500.0), east))
+        crumble = 1.6 * away * fractal_land(rng, north, east, 9.0, 3)
+        beyond = across - foot + crumble
+        face = np.maximum(tall, 3.0) * smooth_step(beyond, 0.0, 5.0 + 0.12 * tall)
+
+        north_rise = np.maximum(beyond - 5.0, 0.0)
+        south_rise = np.maximum(-across - self._river_south_m - 28.0, 0.0)
+        ridges = fractal_land(rng, north, east, 170.0, 6, ridged=True)
+        slope = self._steepness * (_eased(north_rise) + _eased(south_rise))
+        mountain = slope * (0.35 + 0.9 * ridges)
+        far = smooth_step(np.hypot(north, east), 150.0, 700.0)
+        massif = (
+            smooth_step(north_rise + south_rise, 20.0, 160.0) * self._peak_m * ridges * (0.45 + 1.6 * far)
+        )
+
+        corridor = np.exp(-((east / 12.0) ** 4)) * smooth_step(north, -14.0, -6.0)
+        calm = 1.0 - 0.9 * corridor * (1.0 - smooth_step(beyond, 0.0, 6.0))
+        rolling = 1.5 * fractal_land(rng, north, east, 34.0, 4) + 0.5 * fractal_land(rng, north, east, 7.0, 3)
+        rugged = (
+            smooth_step(north_rise + south_rise, 2.0, 30.0) * 3.0 * fractal_land(rng, north, east, 14.0, 4)
+        )
+        land = face + mountain + massif + (rolling + rugged) * calm
+        land -= land.ravel()[np.argmin(np.hypot(north, east))]
+        land *= 1.0 - np.exp(-((np.hypot(north, east) / 4.0) ** 2))
+        return self._carved(land, north, east)
+
+    def _carved(self, land: Values, north: Values, east: Values) -> Values:
+        off = np.abs(north - self.river_north_m(east))
+        half = self.river_half_m(east)
+        dry = np.maximum(land, self.water_m + 0.4)
+        shore = self.water_m + 0.3
+        bank = shore + (dry - shore) * smooth_step(off, half, half + 7.0)
+        bed = shore - 1.6 * (1.0 - (off / half) ** 2)
+        return np.asarray(np.where(off < half, bed, bank))
+
+
+def build(seed: int) -> SceneDescription:
+    """The mountain valley of one seed."""
+    rng = np.random.default_rng([seed, 0x3017])
+    valley = _Valley(rng)
+    lines = stretched_axis(_CORE_M, _SPACING_M, _REACH_M)
+    north, east = np.meshgrid(lines, lines, indexing="ij")
+    grid = TerrainGrid(lines, lines, valley.height_m(north, east))
+    snow_line_m = float(rng.choice([-30.0, 8.0, 28.0, 55.0], p=[0.25, 0.25, 0.3, 0.2]))
+
+    builder = MeshBuilder()
+    _add_land(builder, rng, grid, valley, snow_line_m)
+    _add_river(builder, valley)
+
+    def ground(north_m: ArrayLike, east_m: ArrayLike) -> Values:
+        land = grid.at(north_m, east_m)
+        off = np.abs(np.asarray(north_m, float) - valley.river_north_m(east_m))
+        wet = off <= valley.river_half_m(east_m)
+        return np.asarray(np.where(wet, np.maximum(land, valley.water_m), land))
+
+    _add_boulders(builder, rng, grid, valley)
+    _add_plants(builder, rng, grid, valley, snow_line_m)
+    weather = draw_weather(rng, (0.0006, 0.004))
+    return SceneDescription(
+        mesh=builder.build(),
+        ground_height_m=ground,
+        sun_direction_ned=weather.sun_direction_ned,
+        sun_bgr=weather.sun_bgr,
+        ambient_bgr=weather.ambient_bgr,
+        sky_top_bgr=weather.sky_top_bgr,
+        sky_horizon_bgr=weather.sky_horizon_bgr,
+        haze_per_m=weather.haze_per_m,
+        cloud_amount=weather.cloud_amount,
+        extent_m=_EXTENT_M,
+    )
+
+
+def _eased(distance: Values) -> Values:
+    """Rises like the distance near the valley and ever slower far away, so that no slope is endless."""
+    return np.asarray(220.0 * (1.0 - np.exp(-distance / 220.0)))
+
+
+def _add_land(
+    builder: MeshBuilder, rng: np.random.Generator, grid: TerrainGrid, valley: _Valley, snow_line_m: float
+) -> None:
+    vertices, faces = grid.triangles()
+    corners = vertices[faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    steep_deg = np.degrees(np.arccos(np.abs(normal[:, 2]) / np.linalg.norm(normal, axis=1)))
+    middle = corners.mean(axis=1)
+    north, east, height = middle[:, 0], middle[:, 1], -middle[:, 2]
+    patches = fractal_land(rng, north, east, 22.0, 4)
+    fine = fractal_land(rng, north, east, 5.0, 2)
+
+    texture = np.full(len(faces), "grass", dtype="<U8")
+    texture[patches + 0.5 * fine > 0.55] = "soil"
+    texture[steep_deg + 9.0 * patches + 5.0 * fine > 31.0] = "scree"
+    texture[steep_deg + 8.0 * patches + 4.0 * fine > 42.0] = "rock"
+    snowy = (height + 14.0 * patches + 5.0 * fine > snow_line_m) & (steep_deg + 8.0 * fine < 47.0)
+    texture[snowy] = "snow"
+    off = np.abs(north - valley.river_north_m(east)) - valley.river_half_m(east)
+    texture[(off < 2.5 + 2.0 * patches) & (height < valley.water_m + 1.1)] = "gravel"
+
+    lush = np.array([1.0, 1.0, 1.0]) * rng.uniform([0.8, 0.85, 0.75], [1.1, 1.1, 1.4])
+    shade = (1.0 + 0.14 * patches + 0.05 * fine)[:, None]
+    tint = np.where((texture == "grass")[:, None], lush, 1.0) * shade
+    tint = np.where(snowy[:, None], 1.0, tint)
+    uv = box_uv(vertices, faces)
+    for name in np.unique(texture):
+        part = texture == name
+        used, local = np.unique(faces[part], return_inverse=True)
+        builder.add(vertices[used], local.reshape(-1, 3), uv[part], str(name), tint[part], smooth=True)
+
+
+def _add_river(builder: MeshBuilder, valley: _Valley) -> None:
+    east = np.arange(-420.0, 420.1, 3.0)
+    middle, half = valley.river_north_m(east), valley.river_half_m(east)
+    down = np.full_like(east, -valley.water_m)
+    south = np.stack([middle - half, east, down], axis=1)
+    northern = np.stack([middle + half, east, down], axis=1)
+    count = len(east)
+    here = np.arange(count - 1)
+    faces = np.concatenate(
+        [
+            np.stack([here, here + 1, here + count], axis=1),
+            np.stack([here + 1, here + 1 + count, here + count], axis=1),
+        ]
+    )
+    vertices = np.concatenate([south, northern])
+    builder.add(vertices, faces, vertices[:, :2], "water", (1.0, 1.0, 1.0), smooth=True)
+
+
+def _in_corridor(north_m: float, east_m: float, valley: _Valley, reach_m: float) -> bool:
+    """Whether something of this reach would stand at the take-off place or before the northern face."""
+    if math.hypot(north_m, east_m) < 8.0 + reach_m:
+        return True
+    return abs(east_m) < _CORRIDOR_HALF_WIDTH_M + reach_m and 0.0 < north_m < valley.cliff_north_m + 12.0
+
+
+def _steepness(grid: TerrainGrid, north_m: float, east_m: float) -> float:
+    """Rise over run of the ground around a place."""
+    span = 1.0
+    north = float(grid.at(north_m + span, east_m) - grid.at(north_m - span, east_m))
+    east = float(grid.at(north_m, east_m + span) - grid.at(north_m, east_m - span))
+    return math.hypot(north, east) / (2 * span)
+
+
+def _add_boulders(builder: MeshBuilder, rng: np.random.Generator, grid: TerrainGrid, valley: _Valley) -> None:
+    for _ in range(_BOULDERS):
+        size = float(np.clip(rng.lognormal(0.1, 0.75), 0.5, 6.0))
+        east = rng.uniform(-150.0, 150.0)
+        place = rng.random()
+        if place < 0.35:
+            north = valley.cliff_north_m + valley._bend * (east / 100.0) ** 2 + rng.normal(-3.0, 6.0)
+        elif place < 0.6:
+            north = float(valley.river_north_m(east)) + rng.normal(0.0, 9.0)
+        else:
+            north = rng.uniform(-150.0, 150.0)
+        if _in_corridor(north, east, valley, size):
+            continue
+        add_boulder(builder, rng, north, east, -float(grid.at(north, east)), size, sunk=rng.uniform(0.2, 0.4))
+
+
+def _add_plants(
+    builder: MeshBuilder, rng: np.random.Generator, grid: TerrainGrid, valley: _Valley, snow_line_m: float
+) -> None:
+    groves = LandNoise(rng, 45.0)
+    tree_line_m = rng.uniform(30.0, 60.0)
+    broadleaf = rng.random() < 0.4
+    planted = 0
+    for _ in range(_TREES * 6):
+        if planted >= _TREES:
+            break
+        north, east = rng.uniform(-155.0, 155.0, 2)
+        height = float(grid.at(north, east))
+        if groves.at(north, east) + rng.normal(0.0, 0.25) < 0.1 or height > tree_line_m + rng.normal(
+            0.0, 8.0
+        ):
+            continue
+        if not _may_grow(grid, valley, north, east, reach_m=3.0):
+            continue
+        snowy = height > snow_line_m + rng.normal(4.0, 5.0)
+        kind: TreeKind = "snowy_conifer" if snowy else "conifer"
+        if not snowy and rng.random() < (0.25 if broadleaf else 0.03):
+            kind = "birch" if rng.random() < 0.5 else "broadleaf"
+        elif rng.random() < 0.03:
+            kind = "dead"
+        add_tree(builder, rng, north, east, -height, rng.uniform(4.0, 15.0), kind)
+        planted += 1
+    for _ in range(_BUSHES):
+        north, east = rng.uniform(-130.0, 130.0, 2)
+        height = float(grid.at(north, east))
+        if height < min(snow_line_m, tree_line_m) and _may_grow(grid, valley, north, east, reach_m=1.5):
+            add_bush(builder, rng, north, east, -height, rng.uniform(0.5, 2.0))
+
+
+def _may_grow(grid: TerrainGrid, valley: _Valley, north_m: float, east_m: float, reach_m: float) -> bool:
+    if _in_corridor(north_m, east_m, valley, reach_m) or _steepness(grid, north_m, east_m) > 0.75:
+        return False
+    off = abs(north_m - float(valley.river_north_m(east_m)))
+    return off > float(valley.river_half_m(east_m)) + 1.5
