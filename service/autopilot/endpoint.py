@@ -76,7 +76,7 @@ def parse_endpoint(text: str) -> Endpoint:
     if kind == "serial":
         return SerialEndpoint(place, _number(text, "baud", number, 1, _MAX_BAUD))
     host = place[1:-1] if place.startswith("[") and place.endswith("]") else place
-    if not host or any(character.isspace() for character in host) or (":" in host and host == place):
+    if not _is_host(host) or (":" in host and host == place):
         raise LinkError(f"autopilot endpoint {text!r} has host {place!r}: {ENDPOINT_FORMS} is needed")
     if kind == "udp":
         return UdpListenEndpoint(host, _number(text, "port", number, 0, 65535))
@@ -91,6 +91,14 @@ def _number(text: str, name: str, digits: str, low: int, high: int) -> int:
             f"needed ({ENDPOINT_FORMS})"
         )
     return int(digits)
+
+
+def _is_host(host: str) -> bool:
+    try:
+        host.encode("idna")  # what the resolver would raise on: empty or overlong labels
+    except UnicodeError:
+        return False
+    return bool(host) and host.isprintable() and " " not in host
 
 
 def _bracketed(host: str) -> str:

@@ -15,8 +15,8 @@ class AutopilotSettings(Section):
     endpoint: str = Field(
         default="udp:0.0.0.0:14550",
         title="Endpoint",
-        description='`"udp:HOST:PORT"` listens, `"udpout:HOST:PORT"` sends there, `"tcp:HOST:PORT"` connects, '
-        '`"serial:DEVICE:BAUD"` opens a port, e.g. `"serial:/dev/ttyAMA0:921600"`. Always MAVLink 2.',
+        description='`"udp:HOST:PORT"` listens, `"udpout:HOST:PORT"` sends there, `"tcp:HOST:PORT"` '
+        'connects, `"serial:DEVICE:BAUD"` opens a port (`"serial:/dev/ttyAMA0:921600"`); always MAVLink 2.',
     )
     system_id: int = Field(
         default=0,

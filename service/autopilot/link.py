@@ -1,0 +1,201 @@
+"""The autopilot link: one thread round a `LinkSession` and a line."""
+
+from __future__ import annotations
+
+import select
+import socket
+import threading
+
+import structlog
+
+from service.autopilot.endpoint import UdpListenEndpoint, parse_endpoint
+from service.autopilot.link_status import LinkStatus
+from service.autopilot.service_state import ServiceState
+from service.autopilot.session import LinkSession
+from service.autopilot.transport import Transport, open_transport
+from service.autopilot.udp_transport import UdpListenTransport
+from service.clock import Clock
+from service.errors import LinkError
+from service.settings.autopilot import AutopilotSettings
+from service.telemetry import Telemetry
+from uavdepth.obstacle_scan import ObstacleScan
+
+_TICK_S = 0.02
+_RETRY_S = 0.5
+_JOIN_S = 3.0
+_MAX_PENDING_BYTES = 400
+"""Two OBSTACLE_DISTANCE: while more waits for the line, nothing new is made."""
+
+_log = structlog.get_logger("autopilot")
+
+
+class AutopilotLink:
+    """Talks to the autopilot in the background and survives whatever the line does.
+
+    Every method returns at once and may be called from any thread.
+
+    Args:
+        settings: the `[autopilot]` section.
+        clock: the service's clock, by which frames are stamped too.
+    """
+
+    def __init__(self, settings: AutopilotSettings, clock: Clock) -> None:
+        self._settings = settings
+        self._clock = clock
+        self._session = LinkSession(settings)
+        self._lock = threading.Lock()
+        self._stop = threading.Event()
+        self._wake_read, self._wake_write = socket.socketpair()
+        self._wake_read.setblocking(False)
+        self._wake_write.setblocking(False)
+        self._congested = False
+        self._first_transport: Transport | None = None
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Begin. A silent or missing autopilot is no error: it is tried again and told in `status`.
+
+        Raises:
+            LinkError: the endpoint is malformed, or the UDP port cannot be bound.
+        """
+        if self._thread is not None:
+            raise LinkError("the autopilot link has been started already")
+        endpoint = parse_endpoint(self._settings.endpoint)
+        if isinstance(endpoint, UdpListenEndpoint):
+            try:
+                self._first_transport = open_transport(endpoint, self._clock)
+            except OSError as error:
+                raise LinkError(f"cannot listen on {endpoint}: {_reason(error)}") from error
+        self._thread = threading.Thread(target=self._run, name="autopilot-link", daemon=True)
+        self._thread.start()
+
+    @property
+    def listen_port(self) -> int | None:
+        """The UDP port that is bound by a `udp:` endpoint (port 0 takes a free one), else None."""
+        transport = self._first_transport
+        return transport.port if isinstance(transport, UdpListenTransport) else None
+
+    def telemetry_at(self, captured_ns: int) -> Telemetry:
+        """What the vehicle did at `captured_ns`.
+
+        Ask late (after inference) rather than early: then messages from both sides of the moment are here.
+        """
+        with self._lock:
+            return self._session.telemetry_at(captured_ns, self._clock.now_ns())
+
+    def newest_pose(self) -> Telemetry:
+        """What the vehicle did last, and when (`at_ns`); empty after 0.5 s of silence."""
+        with self._lock:
+            return self._session.newest_pose(self._clock.now_ns())
+
+    def send_obstacles(self, scan: ObstacleScan, captured_ns: int) -> bool:
+        """Send the scan of the frame captured at `captured_ns`.
+
+        Returns:
+            False, and nothing is sent, if the autopilot is not there, the frame is too old or was sent
+            before, the last message is too recent for the wanted rate, or the line is full.
+        """
+        with self._lock:
+            queued = self._session.send_obstacles(scan, captured_ns, self._clock.now_ns(), self._congested)
+        if queued:
+            self._wake()
+        return queued
+
+    def set_state(self, state: ServiceState) -> None:
+        """Tell this state in HEARTBEAT, at once if it is a new one."""
+        with self._lock:
+            self._session.set_state(state)
+        self._wake()
+
+    def say(self, severity: int, text: str) -> None:
+        """Send a STATUSTEXT (MAV_SEVERITY 0 to 7); the same text at most every 10 s."""
+        with self._lock:
+            self._session.say(severity, text, self._clock.now_ns())
+
+    def status(self) -> LinkStatus:
+        """How the link is doing."""
+        with self._lock:
+            return self._session.status(self._clock.now_ns())
+
+    def close(self) -> None:
+        """Stop and close the line; may be called twice."""
+        self._stop.set()
+        self._wake()
+        if self._thread is not None:
+            self._thread.join(_JOIN_S)
+        if self._thread is None or not self._thread.is_alive():
+            self._wake_read.close()
+            self._wake_write.close()
+
+    def _wake(self) -> None:
+        try:
+            self._wake_write.send(b"\0")
+        except OSError:
+            return  # full: it is awake already; or closed
+
+    # -- the thread
+
+    def _run(self) -> None:
+        try:
+            while not self._stop.is_set():
+                self._run_line()
+        finally:
+            if not self._stop.is_set():  # a fault of ours: say so rather than look connected
+                with self._lock:
+                    self._session.line_failed("the link's thread has ended")
+            self._tell()
+
+    def _run_line(self) -> None:
+        """Open the line and use it until it is lost."""
+        transport: Transport | None = None
+        try:
+            transport = self._first_transport or open_transport(
+                parse_endpoint(self._settings.endpoint), self._clock
+            )
+            with self._lock:
+                self._session.line_opened(self._clock.now_ns())
+            while not self._stop.is_set():
+                self._turn(transport)
+        except OSError as error:
+            with self._lock:
+                self._session.line_failed(_reason(error))
+            self._tell()
+            self._first_transport = None
+            self._stop.wait(_RETRY_S)
+        finally:
+            if transport is not None:
+                transport.close()
+
+    def _turn(self, transport: Transport) -> None:
+        """Wait for bytes, for something to send or for the next tick, and handle it."""
+        waited_for: list[Transport | socket.socket] = [transport, self._wake_read]
+        ready, _, _ = select.select(waited_for, [], [], _TICK_S)
+        if self._wake_read in ready:
+            self._wake_read.recv(4096)
+        arrived = transport.receive() if transport in ready else []
+        arrival_ns = self._clock.now_ns()
+        transport.flush()
+        with self._lock:
+            for data, source in arrived:
+                self._session.receive(data, arrival_ns, source)
+            now_ns = self._clock.now_ns()
+            self._session.tick(now_ns)
+            self._congested = transport.pending_bytes > _MAX_PENDING_BYTES
+            frames = [] if self._congested else self._session.take_output(now_ns)
+            destination = self._session.destination
+        for frame in frames:
+            transport.send(frame, destination)
+        self._tell()
+
+    def _tell(self) -> None:
+        with self._lock:
+            notices = self._session.take_notices()
+        for notice in notices:
+            if notice.problem:
+                _log.warning(notice.text)
+            else:
+                _log.info(notice.text)
+
+
+def _reason(error: OSError) -> str:
+    return error.strerror or str(error) or type(error).__name__

@@ -1,0 +1,59 @@
+"""How the link is doing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class LinkStatus:
+    """The state of the link at one moment.
+
+    Args:
+        endpoint: where the autopilot is looked for.
+        connected: the line is open and the autopilot was heard lately.
+        line_open: socket or port is open, whoever is at the other end.
+        system_id: the vehicle's, or None before it was learnt.
+        autopilot: "ardupilot", "px4", ... or None.
+        mode, armed: by the newest HEARTBEAT, or None.
+        heartbeat_age_s: seconds since it, or None.
+        mavlink1_seen: the autopilot speaks MAVLink 1 now, in which there is no OBSTACLE_DISTANCE.
+        rates_hz: messages a second by name, over two seconds.
+        reboots, clock_steps, line_losses: since the start.
+        clock_synced: round trips bind the autopilot's clock to ours.
+        clock_offset_s: our clock minus the autopilot's, seconds, or None.
+        clock_width_s: width of the bracket that the offset lies in, seconds, or None.
+        sent_obstacles: OBSTACLE_DISTANCE messages handed to the line.
+        obstacle_rate_hz: the same a second, over two seconds.
+        refused_obstacles: scans that were not sent, by reason.
+        bytes_in_per_s, bytes_out_per_s: over two seconds.
+        bad_bytes: bytes that belonged to no MAVLink frame.
+        other_system_ids: other autopilots that were heard and not listened to.
+        problem: what is wrong, fit to show a user; None if nothing is.
+    """
+
+    endpoint: str
+    connected: bool = False
+    line_open: bool = False
+    system_id: int | None = None
+    autopilot: str | None = None
+    mode: str | None = None
+    armed: bool | None = None
+    heartbeat_age_s: float | None = None
+    mavlink1_seen: bool = False
+    rates_hz: Mapping[str, float] = field(default_factory=dict)
+    reboots: int = 0
+    clock_steps: int = 0
+    line_losses: int = 0
+    clock_synced: bool = False
+    clock_offset_s: float | None = None
+    clock_width_s: float | None = None
+    sent_obstacles: int = 0
+    obstacle_rate_hz: float = 0.0
+    refused_obstacles: Mapping[str, int] = field(default_factory=dict)
+    bytes_in_per_s: float = 0.0
+    bytes_out_per_s: float = 0.0
+    bad_bytes: int = 0
+    other_system_ids: tuple[int, ...] = ()
+    problem: str | None = None

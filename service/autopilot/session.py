@@ -1,0 +1,325 @@
+"""The conversation with an autopilot, without sockets, threads or a clock of its own."""
+
+from __future__ import annotations
+
+from collections import Counter, OrderedDict
+from collections.abc import Hashable
+from dataclasses import replace
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from service.autopilot.framing import FrameReader, is_mavlink1
+from service.autopilot.link_status import LinkStatus
+from service.autopilot.motion_history import MotionLimits
+from service.autopilot.notices import Notice, Notices
+from service.autopilot.obstacle_gate import ObstacleGate, Refusal
+from service.autopilot.outbox import Outbox
+from service.autopilot.presence import Presence
+from service.autopilot.rate_meter import RateMeter
+from service.autopilot.service_state import ServiceState
+from service.autopilot.status_text import StatusTexts
+from service.autopilot.streams import StreamRequests, wanted_streams
+from service.autopilot.telemetry_tracker import TelemetryTracker
+from service.autopilot.timesync import TimeSync
+from service.autopilot.vehicle import Hearing, VehicleLearner
+from service.settings.autopilot import AutopilotSettings
+from service.telemetry import Telemetry
+from uavdepth.obstacle_message import encode_obstacle_distance
+from uavdepth.obstacle_scan import ObstacleScan
+
+_MAX_SOURCES = 8
+"""Senders on a UDP port whose bytes are kept apart."""
+
+_SHORT_LIVED_NS = 1_000_000_000
+"""A HEARTBEAT or TIMESYNC that could not leave for a second is made anew."""
+
+_MAVLINK1_TEXT = (
+    "the autopilot speaks MAVLink 1, in which OBSTACLE_DISTANCE does not exist: set SERIALn_PROTOCOL to 2 "
+    "(ArduPilot) or MAV_PROTO_VER to 2 (PX4)"
+)
+
+
+class LinkSession:
+    """Bytes and their arrival times in; telemetry, and bytes to send, out.
+
+    Live and replayed links run through the same session: every moment is an argument, in nanoseconds on the
+    service's clock. Not thread-safe: the caller holds a lock.
+
+    Args:
+        settings: the `[autopilot]` section.
+    """
+
+    def __init__(self, settings: AutopilotSettings) -> None:
+        self._settings = settings
+        self._timeout_ns = round(settings.heartbeat_timeout_s * 1e9)
+        self._learner = VehicleLearner(settings.system_id, self._timeout_ns)
+        self._readers: OrderedDict[Hashable, FrameReader] = OrderedDict()
+        self._tracker = TelemetryTracker(MotionLimits.of(settings))
+        self._streams = StreamRequests(wanted_streams(settings))
+        self._timesync = TimeSync(round(1e9 / settings.timesync_rate_hz))
+        self._presence = Presence()
+        self._texts = StatusTexts()
+        self._gate = ObstacleGate(settings.obstacle_rate_hz, round(settings.max_frame_age_s * 1e9))
+        self._outbox = Outbox()
+        self._outbox.set_system_id(settings.system_id or 1)
+        self._notices = Notices()
+        self._line_open = False
+        self._opened_ns = 0
+        self._heard_ns: int | None = None
+        self._mavlink1 = False
+        self._bad_bytes = 0
+        self._line_losses = 0
+        self._sent_obstacles = 0
+        self._refused: Counter[str] = Counter()
+        self._obstacle_meter, self._in_meter, self._out_meter = RateMeter(), RateMeter(), RateMeter()
+
+    # -- the line
+
+    def line_opened(self, now_ns: int) -> None:
+        """The socket or port is open: say hello at the next `tick`."""
+        self._line_open, self._opened_ns = True, now_ns
+        self._readers.clear()
+        self._outbox.clear()
+        self._presence.restart()
+        self._timesync.restart()
+        self._streams.restart()
+        if self._notices.over("line"):
+            self._notices.news(f"autopilot line {self._settings.endpoint} is open")
+
+    def line_failed(self, reason: str) -> None:
+        """The socket or port could not be opened, or was lost; it is being tried again."""
+        if self._line_open:
+            self._line_losses += 1
+        self._line_open = False
+        self._notices.problem("line", f"autopilot line {self._settings.endpoint}: {reason}; trying again")
+
+    @property
+    def destination(self) -> Hashable:
+        """Where to send on a line with many ends (a UDP port): the vehicle's source, or None."""
+        return self._learner.vehicle.source if self._learner.vehicle else None
+
+    # -- bytes in
+
+    def receive(self, data: bytes, arrival_ns: int, source: Hashable = None) -> None:
+        """Take bytes of any quality.
+
+        Args:
+            data: what came.
+            arrival_ns: when, on the service's clock.
+            source: who sent it, on a line with many ends.
+        """
+        self._in_meter.add(arrival_ns, len(data))
+        reader = self._readers.pop(source, None) or FrameReader()
+        self._readers[source] = reader
+        if len(self._readers) > _MAX_SOURCES:
+            self._readers.popitem(last=False)
+        bad_bytes = reader.bad_bytes
+        for message in reader.read(data):
+            self._on_message(message, arrival_ns, source)
+        self._bad_bytes += reader.bad_bytes - bad_bytes
+
+    def _on_message(self, message: mavlink.MAVLink_message, arrival_ns: int, source: Hashable) -> None:
+        name = message.get_type()
+        if name == "HEARTBEAT":
+            self._on_heartbeat(message, arrival_ns, source)
+        if not self._learner.is_from_vehicle(message, source):
+            return
+        if not self._is_connected(arrival_ns):
+            self._on_vehicle_back(arrival_ns)
+        self._heard_ns = arrival_ns
+        self._on_protocol(is_mavlink1(message))
+        reboots, steps = self._tracker.reboots, self._tracker.clock.steps
+        if name == "ATTITUDE":
+            self._tracker.on_attitude(message, arrival_ns)
+        elif name == "LOCAL_POSITION_NED":
+            self._tracker.on_position(message, arrival_ns)
+        elif name == "DISTANCE_SENSOR":
+            self._tracker.on_range(message)
+        elif name == "TIMESYNC":
+            self._on_timesync(message, arrival_ns)
+        self._streams.on_message(name, arrival_ns)
+        if self._tracker.reboots != reboots:
+            self._streams.restart()
+            self._timesync.restart()
+            self._notices.news("the autopilot has rebooted: asking for its messages again")
+        elif self._tracker.clock.steps != steps:
+            self._timesync.restart()
+            self._notices.news("a clock has stepped: the autopilot's time is taken anew")
+
+    def _on_heartbeat(
+        self, heartbeat: mavlink.MAVLink_heartbeat_message, arrival_ns: int, source: Hashable
+    ) -> None:
+        before = self._learner.vehicle
+        hearing = self._learner.on_heartbeat(heartbeat, source, arrival_ns)
+        vehicle = self._learner.vehicle
+        if hearing is Hearing.FOREIGN and vehicle is not None:
+            self._notices.problem(
+                "foreign",
+                f"another autopilot is heard (system {heartbeat.get_srcSystem()}): listening to system "
+                f"{vehicle.system_id} only",
+            )
+        if hearing is Hearing.LEARNT and vehicle is not None:
+            if before is not None:
+                self._tracker.forget()
+            self._heard_ns = None
+            self._outbox.set_system_id(vehicle.system_id)
+            self._notices.news(f"autopilot heard: {vehicle.autopilot}, system {vehicle.system_id}")
+
+    def _on_vehicle_back(self, arrival_ns: int) -> None:
+        """The first word of the vehicle, or the first after a silence."""
+        self._streams.restart()
+        self._timesync.restart()
+        if self._heard_ns is not None:
+            self._notices.news(f"autopilot is back after {(arrival_ns - self._heard_ns) / 1e9:.1f} s")
+
+    def _on_protocol(self, mavlink1: bool) -> None:
+        self._mavlink1 = mavlink1
+        if mavlink1:
+            self._notices.problem("mavlink1", _MAVLINK1_TEXT)
+        else:
+            self._notices.over("mavlink1")
+
+    def _on_timesync(self, message: mavlink.MAVLink_timesync_message, arrival_ns: int) -> None:
+        answer = self._timesync.answer(message, arrival_ns)
+        if answer is not None:
+            self._outbox.put(answer)
+            return
+        trip = self._timesync.round_trip(message, arrival_ns)
+        if trip is not None:
+            self._tracker.on_round_trip(trip)
+
+    # -- bytes out
+
+    def tick(self, now_ns: int) -> None:
+        """Queue whatever is due; call it at least ten times a second."""
+        if not self._line_open:
+            return
+        heartbeat = self._presence.heartbeat(now_ns)
+        if heartbeat is not None:
+            self._outbox.put(heartbeat, now_ns + _SHORT_LIVED_NS)
+        self._watch_connection(now_ns)
+        vehicle = self._learner.vehicle
+        if vehicle is None or not self._is_connected(now_ns):
+            return
+        for stream in self._streams.due(now_ns):
+            self._outbox.put(stream.request(vehicle.system_id))
+        request = self._timesync.request(now_ns)
+        if request is not None:
+            self._outbox.put(request, now_ns + _SHORT_LIVED_NS)
+        for text in self._texts.due(now_ns):
+            self._outbox.put(text)
+        self._watch_streams(now_ns)
+
+    def take_output(self, now_ns: int) -> list[bytes]:
+        """Frames to write now, in order."""
+        frames = []
+        for message, frame in self._outbox.take(now_ns):
+            frames.append(frame)
+            self._out_meter.add(now_ns, len(frame))
+            if message.get_type() == "OBSTACLE_DISTANCE":
+                self._sent_obstacles += 1
+                self._obstacle_meter.add(now_ns)
+        return frames
+
+    def send_obstacles(
+        self, scan: ObstacleScan, captured_ns: int, now_ns: int, congested: bool = False
+    ) -> bool:
+        """Queue an OBSTACLE_DISTANCE for the frame captured at `captured_ns`, if it may be sent.
+
+        Each frame is sent at most once, while it is fresh, at the wanted rate. `congested` tells that the
+        line has not taken the earlier bytes yet.
+        """
+        if not self._is_connected(now_ns):
+            refusal: Refusal | None = Refusal.NOT_CONNECTED
+        elif congested:
+            refusal = Refusal.CONGESTED
+        else:
+            refusal = self._gate.refusal(captured_ns, now_ns)
+        if refusal is not None:
+            self._refused[refusal.value] += 1
+            return False
+        time_usec = self._tracker.autopilot_us(captured_ns, now_ns)
+        expires_ns = captured_ns + round(self._settings.max_frame_age_s * 1e9)
+        self._outbox.put(encode_obstacle_distance(scan, time_usec=time_usec), expires_ns)
+        self._gate.passed(captured_ns, now_ns)
+        return True
+
+    def set_state(self, state: ServiceState) -> None:
+        """Tell this state in HEARTBEAT from now on."""
+        self._presence.set_state(state)
+
+    def say(self, severity: int, text: str, now_ns: int) -> None:
+        """Queue a STATUSTEXT; repeated texts are held back."""
+        self._texts.say(severity, text, now_ns)
+
+    # -- what is known
+
+    def telemetry_at(self, captured_ns: int, now_ns: int) -> Telemetry:
+        """What held at `captured_ns`; see `Telemetry`."""
+        return self._with_mode(self._tracker.telemetry_at(captured_ns), now_ns)
+
+    def newest_pose(self, now_ns: int) -> Telemetry:
+        """What held at the newest attitude, if that is at most 0.5 s old."""
+        return self._with_mode(self._tracker.newest(now_ns), now_ns)
+
+    def _with_mode(self, telemetry: Telemetry, now_ns: int) -> Telemetry:
+        vehicle = self._learner.vehicle
+        if vehicle is None or now_ns - vehicle.heard_ns > self._timeout_ns:
+            return telemetry
+        return replace(telemetry, armed=vehicle.armed, mode=vehicle.mode)
+
+    def take_notices(self) -> list[Notice]:
+        """Lines for the log that have not been taken yet."""
+        return self._notices.take()
+
+    def status(self, now_ns: int) -> LinkStatus:
+        """How the link is doing."""
+        vehicle, clock = self._learner.vehicle, self._tracker.clock
+        return LinkStatus(
+            endpoint=self._settings.endpoint,
+            connected=self._is_connected(now_ns),
+            line_open=self._line_open,
+            system_id=vehicle.system_id if vehicle else None,
+            autopilot=vehicle.autopilot if vehicle else None,
+            mode=vehicle.mode if vehicle else None,
+            armed=vehicle.armed if vehicle else None,
+            heartbeat_age_s=(now_ns - vehicle.heard_ns) / 1e9 if vehicle else None,
+            mavlink1_seen=self._mavlink1,
+            rates_hz=self._streams.rates_hz(now_ns),
+            reboots=self._tracker.reboots,
+            clock_steps=clock.steps,
+            line_losses=self._line_losses,
+            clock_synced=clock.is_synced(now_ns),
+            clock_offset_s=clock.offset_ns / 1e9 if clock.offset_ns is not None else None,
+            clock_width_s=clock.width_ns / 1e9 if clock.width_ns is not None else None,
+            sent_obstacles=self._sent_obstacles,
+            obstacle_rate_hz=self._obstacle_meter.per_second(now_ns),
+            refused_obstacles=dict(self._refused),
+            bytes_in_per_s=self._in_meter.per_second(now_ns),
+            bytes_out_per_s=self._out_meter.per_second(now_ns),
+            bad_bytes=self._bad_bytes,
+            other_system_ids=tuple(sorted(self._learner.others)),
+            problem=self._notices.standing,
+        )
+
+    def _is_connected(self, now_ns: int) -> bool:
+        return self._line_open and self._heard_ns is not None and now_ns - self._heard_ns <= self._timeout_ns
+
+    def _watch_connection(self, now_ns: int) -> None:
+        endpoint = self._settings.endpoint
+        if self._is_connected(now_ns):
+            self._notices.over("silent")
+        elif now_ns - max(self._opened_ns, self._heard_ns or 0) > self._timeout_ns:
+            if self._learner.vehicle is None:
+                self._notices.problem("silent", f"no autopilot's HEARTBEAT has come on {endpoint}")
+            else:
+                self._notices.problem("silent", f"the autopilot has gone silent on {endpoint}")
+
+    def _watch_streams(self, now_ns: int) -> None:
+        refused = self._streams.refused()
+        if not refused:
+            self._notices.over("streams")
+            return
+        rates = self._streams.rates_hz(now_ns)
+        missing = ", ".join(f"{s.message} at {rates[s.message]:.0f} of {s.rate_hz:.0f} Hz" for s in refused)
+        self._notices.problem("streams", f"the autopilot sends less than asked for: {missing}")
