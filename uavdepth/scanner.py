@@ -1,0 +1,224 @@
+"""From depth to obstacles: 72 directions round the nose, each an obstacle, clear or unknown."""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from uavdepth.attitude import Attitude
+from uavdepth.band_view import BandView, seen_sectors
+from uavdepth.body_rays import body_rays
+from uavdepth.camera import CameraModel, CameraMount
+from uavdepth.errors import ImageSizeError, ScanError
+from uavdepth.level_ground import LevelGround, find_level_ground
+from uavdepth.obstacle_scan import SECTOR_WIDTH_DEG, ObstacleScan, SectorState, sector_bearings_deg
+from uavdepth.range_histogram import RangeHistogram
+
+SMALLEST_SIZE_M = 0.25
+"""Side of the square that must be found at maximum distance; sets the default of min_pixels."""
+
+SMALLEST_AREA_M2 = 0.01
+"""Nearer things must show this much of themselves: 2 cm of pole over half a metre."""
+
+LARGEST_SHARE = 0.05
+"""But never more than this share of an element's pixels: something very near fills the view."""
+
+FREE_SHARE = 0.7
+"""Share of the band's height that must be seen free before an element is clear. The flight level
+itself is then always among what is seen: of the default band it lies at 43 % from the top."""
+
+_GROUND_STRIDE = 4
+_CHUNK_PIXELS = 32768
+"""Pixels worked on at a time, so that the intermediate arrays stay in the processor's cache."""
+
+_NEIGHBOURS = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], dtype=np.uint8)
+
+
+class ObstacleScanner:
+    """Turns depth maps of one camera into scans.
+
+    Points are turned level by roll and pitch (not yaw: bearings stay with the nose), measured from
+    the vehicle's origin, and sorted into elements of 5 degrees by their bearing. A point is an
+    obstacle when it lies in the height band and is not ground.
+
+    An element is
+    - OBSTACLE where enough points support a distance (see `RangeHistogram.nearest_m`), even at the
+      picture's edge;
+    - CLEAR where no obstacle is found and the camera sees every part of it: each 1 degree slice,
+      from the band's top to its bottom at maximum distance, by at least `FREE_SHARE`, with known
+      depth that ends on the ground or beyond maximum distance. Near the vehicle the band is taller
+      than any camera's picture: clear speaks of the part that the camera sees;
+    - UNKNOWN else: outside the picture, partly outside, unknown depth, or tilted away from the
+      flight level.
+
+    Args:
+        camera, mount: the camera and how it sits on the vehicle.
+        min_distance_m: carried into the scan; nearer obstacles are still reported.
+        max_distance_m: horizontal distance that the scan covers.
+        below_m, above_m: the height band from the vehicle's origin, metres.
+        min_pixels: pixels that make an obstacle at maximum distance; None: a square of
+            `SMALLEST_SIZE_M` there, but at least 6.
+
+    Raises:
+        ScanError: distances that are not finite with 0 < min < max, a band without height.
+
+    Example:
+        scanner = ObstacleScanner(camera, CameraMount(pitch_deg=-10))
+        scan = scanner.scan(depth.depth_m, attitude, height_m=4.0)
+    """
+
+    def __init__(
+        self,
+        camera: CameraModel,
+        mount: CameraMount,
+        min_distance_m: float = 0.2,
+        max_distance_m: float = 20.0,
+        below_m: float = 2.0,
+        above_m: float = 1.5,
+        min_pixels: int | None = None,
+    ) -> None:
+        if not (math.isfinite(max_distance_m) and 0.01 <= min_distance_m < max_distance_m <= 599.0):
+            raise ScanError(
+                f"distances are {min_distance_m} to {max_distance_m} m: 0.01 <= min < max <= 599 is needed"
+            )
+        for name, value in (("below_m", below_m), ("above_m", above_m)):
+            if not (math.isfinite(value) and value > 0):
+                raise ScanError(f"{name} is {value}: a finite height above 0 m is needed")
+        if min_pixels is not None and min_pixels < 1:
+            raise ScanError(f"min_pixels is {min_pixels}: at least 1 is needed")
+        self.camera = camera
+        self.mount = mount
+        self.min_distance_m = float(min_distance_m)
+        self.max_distance_m = float(max_distance_m)
+        self.below_m = float(below_m)
+        self.above_m = float(above_m)
+        self._rays = body_rays(camera, mount).reshape(3, -1)
+        self._ground_rays = body_rays(camera, mount, _GROUND_STRIDE).reshape(3, -1)
+        self._view = BandView(camera, mount, max_distance_m, below_m, above_m)
+        self._histogram = RangeHistogram(max_distance_m)
+        self._needed = self._needed_pixels(min_pixels)
+        self._bearings = sector_bearings_deg()
+
+    def scan(
+        self, depth_m: NDArray[np.floating], attitude: Attitude, height_m: float | None = None
+    ) -> ObstacleScan:
+        """Scan one depth map.
+
+        Args:
+            depth_m: (H, W) z-depth in metres at the camera's pixels; NaN, zero and negative are
+                unknown, +inf is nothing there.
+            attitude: of the vehicle when the picture was taken; yaw is not used.
+            height_m: vehicle's origin above ground, vertically. None, NaN or not above 0: not known;
+                then the ground is looked for in the depth itself, and where it is not found beyond
+                doubt, whatever lies in the height band is an obstacle.
+
+        Raises:
+            ImageSizeError: depth that is not (H, W) of the camera.
+            ScanError: roll or pitch that is not finite.
+        """
+        if np.shape(depth_m) != (self.camera.height, self.camera.width):
+            raise ImageSizeError(
+                f"the depth map's shape is {np.shape(depth_m)}, "
+                f"the camera's is {(self.camera.height, self.camera.width)}"
+            )
+        if not (math.isfinite(attitude.roll_rad) and math.isfinite(attitude.pitch_rad)):
+            raise ScanError(f"attitude is {attitude}: a finite roll and pitch are needed")
+        depth = np.array(depth_m, dtype=np.float32, order="C")
+        with np.errstate(invalid="ignore"):
+            depth[~(depth > 0)] = np.nan
+        level = attitude.level_from_body
+        ground = self._ground(depth, level, height_m)
+
+        distance = self._nearest(_without_speckles(depth).ravel(), level, ground)
+        clear = self._seen_free(depth.ravel(), level, ground)
+        state = np.where(clear, SectorState.CLEAR, SectorState.UNKNOWN).astype(np.uint8)
+        state[~np.isnan(distance)] = SectorState.OBSTACLE
+        return ObstacleScan(distance, state, self._bearings, self.min_distance_m, self.max_distance_m)
+
+    def _nearest(
+        self, depth: NDArray[np.float32], level: NDArray[np.float64], ground: LevelGround | None
+    ) -> NDArray[np.float32]:
+        """(72,) distance of the nearest obstacle, NaN for none, from every pixel."""
+        self._histogram.clear()
+        for start in range(0, depth.size, _CHUNK_PIXELS):
+            chunk = slice(start, start + _CHUNK_PIXELS)
+            points, range_m = self._level_points(self._rays[:, chunk], depth[chunk], level)
+            obstacle = self._is_obstacle(points[2], range_m, ground)
+            if obstacle.any():
+                self._histogram.add(points[0], points[1], range_m, obstacle)
+        return self._histogram.nearest_m(self._needed)
+
+    def _seen_free(
+        self, depth: NDArray[np.float32], level: NDArray[np.float64], ground: LevelGround | None
+    ) -> NDArray[np.bool_]:
+        """(72,) whether the band is seen and free up to maximum distance."""
+        probe = self._view.probe(level)
+        probed = depth[probe.pixel]
+        points, range_m = self._level_points(self._rays[:, probe.pixel], probed, level)
+        free = ~np.isnan(probed) & ~self._is_obstacle(points[2], range_m, ground)
+        return seen_sectors(free, probe.cell, FREE_SHARE)
+
+    def _level_points(
+        self, rays: NDArray[np.float32], depth: NDArray[np.float32], level: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """(3, N) points in the level frame from the vehicle's origin, and (N,) their horizontal distance."""
+        points = np.matmul(level.astype(np.float32), rays)
+        with np.errstate(invalid="ignore", over="ignore"):
+            points *= depth
+            origin = level @ self.mount.position_body_m
+            if origin.any():
+                points += origin.astype(np.float32)[:, None]
+            range_m = points[0] * points[0]
+            range_m += points[1] * points[1]
+            np.sqrt(range_m, out=range_m)
+        return points, range_m
+
+    def _is_obstacle(
+        self, down_m: NDArray[np.float32], range_m: NDArray[np.float32], ground: LevelGround | None
+    ) -> NDArray[np.bool_]:
+        deepest = self.below_m if ground is None else min(self.below_m, ground.deep_m)
+        with np.errstate(invalid="ignore"):
+            obstacle = down_m >= np.float32(-self.above_m)
+            obstacle &= down_m <= np.float32(deepest)
+            obstacle &= range_m < np.float32(self.max_distance_m)
+            if ground is not None:
+                limit = range_m * np.float32(-ground.slope)
+                limit += np.float32(ground.height_m)
+                obstacle &= down_m <= limit
+        return obstacle
+
+    def _ground(
+        self, depth: NDArray[np.float32], level: NDArray[np.float64], height_m: float | None
+    ) -> LevelGround | None:
+        if height_m is not None and math.isfinite(height_m) and height_m > 0:
+            return LevelGround.below(height_m)
+        start = _GROUND_STRIDE // 2
+        sparse = depth[start::_GROUND_STRIDE, start::_GROUND_STRIDE].ravel()
+        points, range_m = self._level_points(self._ground_rays, sparse, level)
+        directions = level[2].astype(np.float32) @ self._ground_rays
+        directions /= np.linalg.norm(self._ground_rays, axis=0)
+        return find_level_ground(points[2], range_m, directions)
+
+    def _needed_pixels(self, min_pixels: int | None) -> NDArray[np.int64]:
+        """(bins,) pixels that make an obstacle at each distance of the histogram."""
+        pixels_at_1m = self.camera.fx * self.camera.fy
+        if min_pixels is None:
+            min_pixels = max(6, round(pixels_at_1m * (SMALLEST_SIZE_M / self.max_distance_m) ** 2))
+        element = self.camera.fx * math.radians(SECTOR_WIDTH_DEG) * self.camera.height
+        shown = pixels_at_1m * SMALLEST_AREA_M2 / np.square(self._histogram.edges_m[:-1].astype(np.float64))
+        most = max(min_pixels, int(LARGEST_SHARE * element))
+        return np.clip(shown, min_pixels, most).astype(np.int64)
+
+
+def _without_speckles(depth: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Depth with single pixels that are nearer than all of their neighbours pushed back to the nearest one.
+
+    A line one pixel wide, such as a thin pole or a wire, stays: its pixels have each other.
+    """
+    known = depth.copy()
+    known[np.isnan(known)] = np.inf
+    nearest_neighbour = cv2.erode(known, _NEIGHBOURS)
+    return np.asarray(np.maximum(depth, nearest_neighbour), dtype=np.float32)
