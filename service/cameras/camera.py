@@ -43,7 +43,7 @@ class Camera(ABC):
 
     def __init__(self, settings: CameraSettings, clock: Clock) -> None:
         self.settings = settings
-        self._clock = clock
+        self.clock = clock
         self._index = 0
         self._interrupted = threading.Event()
 

@@ -42,14 +42,14 @@ class ImageFolderCamera(Camera):
                 f"[camera] source: {self._folder}: no pictures in it ({', '.join(sorted(PICTURE_SUFFIXES))})"
             )
         self._next = 0
-        self._pace = Pace(self.settings.fps, self._clock.now_ns())
+        self._pace = Pace(self.settings.fps, self.clock.now_ns())
 
     def read(self, timeout_s: float) -> Frame:
         if self._pace is None:
             raise CameraError(f"camera {self.name}: not open")
         if self.settings.realtime:
-            self._wait(self._pace.wait_s(self._clock.now_ns()))
-            late = self._pace.late_pictures(self._clock.now_ns())
+            self._wait(self._pace.wait_s(self.clock.now_ns()))
+            late = self._pace.late_pictures(self.clock.now_ns())
             for _ in range(min(late, len(self._paths) - 1 - self._next)):
                 self._next += 1
                 self._pace.step()
@@ -63,7 +63,7 @@ class ImageFolderCamera(Camera):
         due_ns = self._pace.step()
         if image is None:
             raise CameraError(f"camera {self.name}: {path.name} is not a picture that can be read")
-        captured_ns = due_ns if self.settings.realtime else self._clock.now_ns()
+        captured_ns = due_ns if self.settings.realtime else self.clock.now_ns()
         return self._frame(np.asarray(image, np.uint8), captured_ns)
 
     def close(self) -> None:

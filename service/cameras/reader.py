@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import structlog
@@ -44,12 +44,14 @@ class CameraStatus:
         detail: what went wrong last, in words; empty while it delivers.
         frames: pictures delivered since the start.
         reopened: how often it was opened again.
+        newest_ns: when the newest picture arrived, None before the first.
     """
 
     state: CameraState
     detail: str
     frames: int
     reopened: int
+    newest_ns: int | None = None
 
 
 class CameraReader:
@@ -140,8 +142,13 @@ class CameraReader:
             if self._reported:
                 log.info("camera delivers again", camera=self._camera.name)
                 self._reported = ""
-            before = self._status
-            self._status = CameraStatus(CameraState.DELIVERING, "", before.frames + 1, before.reopened)
+            self._status = replace(
+                self._status,
+                state=CameraState.DELIVERING,
+                detail="",
+                frames=self._status.frames + 1,
+                newest_ns=self._camera.clock.now_ns(),
+            )
 
     def _give_up(self, error: UavDepthError) -> None:
         self._failure = error
@@ -158,8 +165,7 @@ class CameraReader:
         self._reported = detail
 
     def _show(self, state: CameraState, detail: str) -> None:
-        self._status = CameraStatus(state, detail, self._status.frames, self._status.reopened)
+        self._status = replace(self._status, state=state, detail=detail)
 
     def _count_reopening(self) -> None:
-        before = self._status
-        self._status = CameraStatus(before.state, before.detail, before.frames, before.reopened + 1)
+        self._status = replace(self._status, reopened=self._status.reopened + 1)

@@ -59,31 +59,31 @@ class RenderedCamera(Camera):
             from uavdepth.scenes import load_scene, parse_scene
 
             self._scene = load_scene(*parse_scene(self._spec))
-        self._due_ns = self._clock.now_ns()
+        self._due_ns = self.clock.now_ns()
 
     def read(self, timeout_s: float) -> Frame:
         if self._scene is None:
             raise CameraError(f"camera {self.name}: not open")
-        self._wait((self._due_ns - self._clock.now_ns()) / 1e9)
+        self._wait((self._due_ns - self.clock.now_ns()) / 1e9)
         pose = self._fresh_pose(timeout_s)
         if pose.position_ned_m is None or pose.attitude is None:
             raise CameraError(f"camera {self.name}: a pose without position or attitude")
         # A late picture does not make the following ones hurry.
-        self._due_ns = max(self._due_ns, self._clock.now_ns()) + round(1e9 / self.settings.fps)
+        self._due_ns = max(self._due_ns, self.clock.now_ns()) + round(1e9 / self.settings.fps)
         self._last_pose_ns = pose.at_ns
         picture = self._scene.render(self._model, self._mount, pose.position_ned_m, pose.attitude)
         return self._frame(picture.image_bgr, pose.at_ns)
 
     def _fresh_pose(self, timeout_s: float) -> Telemetry:
         """A pose that is newer than the last picture's and whole."""
-        end_ns = self._clock.now_ns() + round(timeout_s * 1e9)
+        end_ns = self.clock.now_ns() + round(timeout_s * 1e9)
         while True:
             newest = self._poses.newest_pose()
             if newest.at_ns > self._last_pose_ns:
                 pose = self._poses.telemetry_at(newest.at_ns)
                 if pose.position_ned_m is not None and pose.attitude is not None:
                     return pose
-            if self._clock.now_ns() >= end_ns:
+            if self.clock.now_ns() >= end_ns:
                 raise CameraTimeoutError(
                     f"camera {self.name}: waits for the autopilot's position and attitude "
                     "(LOCAL_POSITION_NED, ATTITUDE)"

@@ -53,7 +53,7 @@ class RtspCamera(Camera):
             raise CameraTimeoutError(
                 f"camera {self.name}: no picture within {self.settings.read_timeout_s:g} s, or stream ended"
             )
-        return self._frame(np.asarray(image, np.uint8), self._clock.now_ns())
+        return self._frame(np.asarray(image, np.uint8), self.clock.now_ns())
 
     def close(self) -> None:
         if self._capture is not None:

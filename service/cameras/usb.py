@@ -59,7 +59,7 @@ class UsbCamera(Camera):
         whole, image = self._capture.read()
         if not whole:
             raise CameraTimeoutError(f"camera {self.name}: delivers nothing")
-        return self._frame(np.asarray(image, np.uint8), self._clock.now_ns() - _age_ns(self._capture))
+        return self._frame(np.asarray(image, np.uint8), self.clock.now_ns() - _age_ns(self._capture))
 
     def close(self) -> None:
         if self._capture is not None:

@@ -42,14 +42,14 @@ class VideoFileCamera(Camera):
         own_fps = capture.get(cv2.CAP_PROP_FPS)
         low, high = _SENSIBLE_FPS
         fps = own_fps if low <= own_fps <= high else self.settings.fps
-        self._pace = Pace(fps, self._clock.now_ns())
+        self._pace = Pace(fps, self.clock.now_ns())
 
     def read(self, timeout_s: float) -> Frame:
         if self._capture is None or self._pace is None:
             raise CameraError(f"camera {self.name}: not open")
         if self.settings.realtime:
-            self._wait(self._pace.wait_s(self._clock.now_ns()))
-            for _ in range(self._pace.late_pictures(self._clock.now_ns())):
+            self._wait(self._pace.wait_s(self.clock.now_ns()))
+            for _ in range(self._pace.late_pictures(self.clock.now_ns())):
                 if not self._capture.grab():
                     break
                 self._pace.step()
@@ -60,7 +60,7 @@ class VideoFileCamera(Camera):
             if not whole:
                 raise CameraError(f"camera {self.name}: no picture can be read from {self._path}")
         due_ns = self._pace.step()
-        captured_ns = due_ns if self.settings.realtime else self._clock.now_ns()
+        captured_ns = due_ns if self.settings.realtime else self.clock.now_ns()
         return self._frame(np.asarray(image, np.uint8), captured_ns)
 
     def _start_again(self) -> None:

@@ -19,7 +19,7 @@ class ModelSettings(Section):
         description="`default` for the weights inside the package, or the path of an ONNX file "
         "with a model card.",
     )
-    provider: Literal["auto", "cpu", "cuda", "tensorrt", "openvino"] = Field(
+    provider: Literal["auto", "cpu", "openvino"] = Field(
         default="auto",
         title="ONNX Runtime provider",
         description="What computes the network; `auto` takes the best one that is installed.",

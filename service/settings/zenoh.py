@@ -9,15 +9,15 @@ from pydantic import AfterValidator, Field, model_validator
 
 from service.settings.section import Section
 
-_ENDPOINT = re.compile(r"^(tcp|tls|udp|quic|ws)/(\[[0-9A-Fa-f:.]+\]|[^\s:/\[\]]+):(\d{1,5})([?#].*)?$")
-_ENDPOINT_FORM = "tcp/HOST:PORT (or tls, udp, quic, ws)"
+_ENDPOINT = re.compile(r"^(tcp|udp)/(\[[0-9A-Fa-f:.]+\]|[^\s:/\[\]]+):(\d{1,5})([?#].*)?$")
+_ENDPOINT_FORM = "tcp/HOST:PORT or udp/HOST:PORT"
 
 
 def check_endpoint(endpoint: str) -> str:
-    """`endpoint` unchanged. Raises ValueError if it is not `protocol/host:port`, Zenoh's form."""
+    """`endpoint` unchanged. Raises ValueError if it is not of Zenoh's form, `tcp/host:port`."""
     match = _ENDPOINT.match(endpoint)
     if match is None:
-        raise ValueError(f"{endpoint!r} is no Zenoh endpoint: {_ENDPOINT_FORM} is needed")
+        raise ValueError(f"{endpoint!r} is no endpoint: {_ENDPOINT_FORM} is needed")
     if not 1 <= int(match[3]) <= 65535:
         raise ValueError(f"{endpoint!r} has port {match[3]}: 1 to 65535 is needed")
     return endpoint

@@ -1,0 +1,148 @@
+"""The command `uavdepth`.
+
+Only the command that runs is imported, so that help is fast and extras stay optional.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, NoReturn
+
+import typer
+
+from service.errors import ConfigError
+from uavdepth.errors import UavDepthError
+
+EXIT_FAILURE = 1
+EXIT_CONFIG = 2
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command and where it lives.
+
+    Args:
+        module, name: the typer function, or for groups the `Typer`.
+        summary: its line in the help.
+        extra: the extra that it needs, if any.
+        is_group: it has commands of its own.
+    """
+
+    module: str
+    name: str
+    summary: str
+    extra: str | None = None
+    is_group: bool = False
+
+
+COMMANDS = {
+    "run": Command("service.run_command", "run", "Fly: camera to depth to OBSTACLE_DISTANCE and Zenoh."),
+    "watch": Command("service.watch.command", "watch", "Show scan and status of vehicles live."),
+    "demo": Command(
+        "service.demo.command", "demo", "Fly a simulated vehicle at a wall that only the network sees."
+    ),
+    "config": Command(
+        "service.settings.command", "config_app", "Describe and check the configuration.", is_group=True
+    ),
+    "fake-autopilot": Command(
+        "service.fake_autopilot.command", "fake_autopilot", "Speak MAVLink like ArduPilot or PX4.", "sim"
+    ),
+    "benchmark": Command("service.benchmark.command", "benchmark", "Measure speed and memory."),
+    "train": Command("training.commands", "train", "Train a depth network.", "train"),
+    "evaluate": Command("training.commands", "evaluate", "Measure a depth network's errors.", "train"),
+    "export": Command(
+        "training.commands", "export", "Write a trained network as ONNX with its card.", "train"
+    ),
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Entry point of the console script. Errors become one message on standard error and an exit code.
+
+    Exit codes: 0 done, 1 a failure at run time, 2 a wrong configuration or command line.
+    """
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    wanted = next((word for word in words if not word.startswith("-")), None)
+    try:
+        build_app(wanted)(words, prog_name="uavdepth")
+    except ConfigError as error:
+        fail(error, EXIT_CONFIG)
+    except UavDepthError as error:
+        fail(error, EXIT_FAILURE)
+    except KeyboardInterrupt:
+        sys.exit(130)
+    sys.exit(0)
+
+
+def build_app(wanted: str | None) -> typer.Typer:
+    """The application in which `wanted` is the real command and all others are lines of the help."""
+    app = typer.Typer(
+        name="uavdepth",
+        help="Obstacle awareness for drones from one camera.",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+    )
+    app.callback()(_options)
+    for name, command in COMMANDS.items():
+        target: Any = _load(name, command) if name == wanted else _line_of_help(command)
+        if command.is_group:
+            app.add_typer(target, name=name, help=command.summary)
+        else:
+            app.command(name, help=None if name == wanted else command.summary)(target)
+    return app
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"uavdepth {version('uavdepth')}")
+        raise typer.Exit
+
+
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option("--version", help="Print the version and end.", is_eager=True, callback=_show_version),
+    ] = False,
+) -> None:
+    """Options of the program itself."""
+
+
+def _line_of_help(command: Command) -> Callable[[], None] | typer.Typer:
+    if command.is_group:
+        group = typer.Typer()
+        group.callback()(_nothing)
+        return group
+    return lambda: None
+
+
+def _nothing() -> None:
+    """Stand in for a command that is not imported."""
+
+
+def _load(name: str, command: Command) -> Any:
+    """The real command.
+
+    Raises:
+        UavDepthError: a package of an extra is not installed; the text names the extra.
+    """
+    try:
+        return getattr(importlib.import_module(command.module), command.name)
+    except ModuleNotFoundError as error:
+        missing = (error.name or "").partition(".")[0]
+        if command.extra is None or missing in ("uavdepth", "service", "training", ""):
+            raise UavDepthError(f"uavdepth {name}: this installation lacks {error.name}") from error
+        raise UavDepthError(
+            f"uavdepth {name} needs {missing}: pip install 'uavdepth[{command.extra}]'"
+        ) from error
+
+
+def fail(error: UavDepthError, code: int) -> NoReturn:
+    """Say what went wrong and end."""
+    typer.echo(f"uavdepth: {error}", err=True)
+    sys.exit(code)

@@ -1,0 +1,1 @@
+"""Zenoh: what leaves towards the ground station, and how it is written."""

@@ -1,0 +1,230 @@
+"""What the samples say: versioned JSON, the same models for writing and reading."""
+
+from __future__ import annotations
+
+from typing import Final, Literal, Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from service.errors import PublisherError
+from uavdepth.camera import CameraModel
+from uavdepth.obstacle_scan import (
+    FIRST_BEARING_DEG,
+    SECTOR_COUNT,
+    SECTOR_WIDTH_DEG,
+    ObstacleScan,
+    SectorState,
+    sector_bearings_deg,
+)
+
+WIRE_VERSION: Final = 1
+"""Grows when a reader of the older version would misunderstand a sample."""
+
+_MAX_SAMPLE_BYTES = 65_536
+"""No scan, header or status is near it: larger text from the network is not even parsed."""
+
+
+class WireError(PublisherError):
+    """A sample that is not what its key says."""
+
+
+class _Message(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
+
+    version: Literal[1] = WIRE_VERSION
+
+    def encode(self) -> bytes:
+        """UTF-8 JSON, compact."""
+        return self.model_dump_json().encode()
+
+    @classmethod
+    def decode(cls, data: bytes) -> Self:
+        """Read what `encode` wrote, from a peer that need not be trusted.
+
+        Raises:
+            WireError: anything else, another version included.
+        """
+        if len(data) > _MAX_SAMPLE_BYTES:
+            raise WireError(f"{cls.__name__} of {len(data)} bytes: at most {_MAX_SAMPLE_BYTES} are read")
+        try:
+            return cls.model_validate_json(data)
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(str(part) for part in first["loc"]) or "the text"
+            raise WireError(f"{cls.__name__}: {where}: {first['msg']}") from error
+
+
+class Stamp(_Message):
+    """When a sample's picture was taken.
+
+    Args:
+        index: running number of the frame.
+        captured_ns: capture time on the vehicle's monotonic clock, nanoseconds.
+        age_ms: time from capture to publishing, milliseconds.
+    """
+
+    index: int = Field(ge=0)
+    captured_ns: int
+    age_ms: float = Field(ge=0.0)
+
+
+class Intrinsics(BaseModel):
+    """The camera that a picture's pixels belong to; names and units as in `CameraModel`."""
+
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    distortion: tuple[float, ...] = ()
+
+    @classmethod
+    def of(cls, camera: CameraModel) -> Intrinsics:
+        """The wire's form of `camera`."""
+        return cls(
+            width=camera.width,
+            height=camera.height,
+            fx=camera.fx,
+            fy=camera.fy,
+            cx=camera.cx,
+            cy=camera.cy,
+            distortion=camera.distortion,
+        )
+
+
+class DepthHeader(Stamp):
+    """Attachment of a depth sample, whose payload is the 8-bit logarithmic PNG.
+
+    Args:
+        encoding: the codec, `uavdepth.depth_codec`.
+        near_m, far_m: ends of the logarithmic scale in metres.
+        camera: the depth picture's camera.
+        scale_factor: network units to metres.
+        scale_relative_sigma: its relative standard deviation.
+    """
+
+    encoding: Literal["log8-png"] = "log8-png"
+    near_m: float = Field(gt=0.0)
+    far_m: float = Field(gt=0.0)
+    camera: Intrinsics
+    scale_factor: float | None = None
+    scale_relative_sigma: float | None = None
+
+
+class CameraHeader(Stamp):
+    """Attachment of a camera sample, whose payload is a JPEG."""
+
+    camera: Intrinsics
+
+
+class ScanSample(Stamp):
+    """One scan round the nose.
+
+    Args:
+        trusted: whether these distances went to the autopilot; if not, every element is unknown.
+        trouble: why not, in words.
+        min_distance_m, max_distance_m: what the scan covers.
+        first_bearing_deg, step_deg: bearing of the first element, clockwise from the nose, and the step.
+        state: one digit an element: 0 unknown, 1 clear, 2 obstacle.
+        distance_cm: one whole number an element, -1 where the state is not obstacle.
+    """
+
+    trusted: bool
+    trouble: str | None = None
+    min_distance_m: float
+    max_distance_m: float
+    first_bearing_deg: float = FIRST_BEARING_DEG
+    step_deg: float = SECTOR_WIDTH_DEG
+    state: str = Field(pattern=rf"^[012]{{{SECTOR_COUNT}}}$")
+    distance_cm: tuple[int, ...] = Field(min_length=SECTOR_COUNT, max_length=SECTOR_COUNT)
+
+    @model_validator(mode="after")
+    def _obstacles_have_distances(self) -> Self:
+        for state, distance in zip(self.state, self.distance_cm, strict=True):
+            if (state == "2") != (distance >= 0):
+                raise ValueError(f"state {state} with distance {distance} cm")
+        return self
+
+    @classmethod
+    def of(
+        cls, scan: ObstacleScan, *, index: int, captured_ns: int, age_ms: float, trouble: str | None
+    ) -> ScanSample:
+        """The wire's form of a scan; `trouble` is None if it is trusted."""
+        # Floor, as a shown distance must never exceed the true one.
+        centimetres = np.where(
+            scan.state == SectorState.OBSTACLE, np.floor(np.nan_to_num(scan.distance_m, nan=0.0) * 100), -1
+        ).astype(int)
+        return cls(
+            index=index,
+            captured_ns=captured_ns,
+            age_ms=age_ms,
+            trusted=trouble is None,
+            trouble=trouble,
+            min_distance_m=scan.min_distance_m,
+            max_distance_m=scan.max_distance_m,
+            state="".join(str(int(state)) for state in scan.state),
+            distance_cm=tuple(centimetres.tolist()),
+        )
+
+    @property
+    def scan(self) -> ObstacleScan:
+        """The library's form."""
+        distance_cm = np.array(self.distance_cm, np.float32)
+        return ObstacleScan(
+            np.where(distance_cm >= 0, distance_cm / 100, np.nan).astype(np.float32),
+            np.array([int(digit) for digit in self.state], np.uint8),
+            sector_bearings_deg(),
+            self.min_distance_m,
+            self.max_distance_m,
+        )
+
+
+class StatusSample(_Message):
+    """The service at one moment, as a ground station shows it.
+
+    Args:
+        vehicle: its name.
+        state: BOOT, STANDBY, ACTIVE or CRITICAL.
+        trouble: why no distances are sent, in words; None if they are.
+        uptime_s: since the start of the service.
+        frames_per_s: pictures that were measured.
+        obstacle_messages: OBSTACLE_DISTANCE messages since the start.
+        latency_ms_p50, latency_ms_p95: from capture to wire; None before the first message.
+        dropped_frames, dropped_samples: values that a newer one replaced, per slot.
+        model_failures: pictures that the network failed on.
+        scale_factor, scale_relative_sigma, scale_age_s: metric scale from the ground; None if there is none.
+        height_m, mode, armed: of the vehicle; None if not heard.
+        camera, camera_detail: state of the camera.
+        link_connected, autopilot, system_id: of the MAVLink link.
+        link_detail: what is wrong with it, in words; empty if nothing.
+        memory_mib: resident memory.
+    """
+
+    vehicle: str
+    state: str
+    trouble: str | None = None
+    uptime_s: float
+    frames_per_s: float
+    obstacle_messages: int
+    latency_ms_p50: float | None = None
+    latency_ms_p95: float | None = None
+    dropped_frames: int = 0
+    dropped_samples: int = 0
+    model_failures: int = 0
+    scale_factor: float | None = None
+    scale_relative_sigma: float | None = None
+    scale_age_s: float | None = None
+    height_m: float | None = None
+    mode: str | None = None
+    armed: bool | None = None
+    camera: str
+    camera_detail: str = ""
+    link_connected: bool
+    autopilot: str | None = None
+    system_id: int | None = None
+    link_detail: str = ""
+    memory_mib: float

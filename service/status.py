@@ -1,0 +1,125 @@
+"""The service at one moment: what `status`, the ground station and the log show."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from service.autopilot.link_status import LinkStatus
+from service.autopilot.service_state import ServiceState
+from service.cameras.reader import CameraStatus
+from service.publisher.publisher import PublisherStatus
+from service.scale_hold import ScaleStatus
+from service.trouble import Trouble
+
+_MIB = 1024 * 1024
+
+
+@dataclass(frozen=True)
+class Latency:
+    """From capture to wire, over the last messages, milliseconds.
+
+    Args:
+        p50_ms, p95_ms: half and 19 of 20 messages were not slower.
+    """
+
+    p50_ms: float
+    p95_ms: float
+
+
+class LatencyMeter:
+    """Remembers the delays of the last messages.
+
+    Args:
+        count: how many.
+    """
+
+    def __init__(self, count: int = 450) -> None:
+        self._delays_ms: deque[float] = deque(maxlen=count)
+
+    def add(self, delay_ns: int) -> None:
+        """Count one delay in nanoseconds."""
+        self._delays_ms.append(delay_ns / 1e6)
+
+    @property
+    def latency(self) -> Latency | None:
+        """The percentiles, or None before the first delay."""
+        delays = list(self._delays_ms)
+        if not delays:
+            return None
+        p50, p95 = np.percentile(delays, [50, 95])
+        return Latency(float(p50), float(p95))
+
+
+@dataclass(frozen=True)
+class Drops:
+    """Values that a newer one replaced before they were used, per slot.
+
+    Args:
+        frames: pictures that the network had no time for.
+        samples: results that the Zenoh publisher had no time for.
+    """
+
+    frames: int
+    samples: int
+
+
+@dataclass(frozen=True)
+class ServiceStatus:
+    """The service at one moment.
+
+    Args:
+        vehicle: its name.
+        uptime_s: since the start, seconds.
+        state: as in the HEARTBEAT.
+        trouble: why no distances are sent, None if they are.
+        frames: pictures measured since the start.
+        frames_per_s: the same over the last seconds.
+        step_ms: mean time of one measurement, milliseconds; None before the first.
+        obstacle_messages: OBSTACLE_DISTANCE messages since the start.
+        obstacle_rate_hz: the same over the last seconds.
+        latency: from capture to wire; None before the first message.
+        drops: what was skipped.
+        model_failures: pictures that the network failed on.
+        scale: metric scale from the ground; None before the first.
+        height_m, mode, armed: the vehicle's; None if not heard.
+        camera: the camera.
+        link: the MAVLink link.
+        publisher: Zenoh; None if switched off.
+        memory_mib: resident memory, 0 where the system does not tell.
+    """
+
+    vehicle: str
+    uptime_s: float
+    state: ServiceState
+    trouble: Trouble | None
+    frames: int
+    frames_per_s: float
+    step_ms: float | None
+    obstacle_messages: int
+    obstacle_rate_hz: float
+    latency: Latency | None
+    drops: Drops
+    model_failures: int
+    scale: ScaleStatus | None
+    height_m: float | None
+    mode: str | None
+    armed: bool | None
+    camera: CameraStatus
+    link: LinkStatus
+    publisher: PublisherStatus | None
+    memory_mib: float
+
+
+def resident_memory_mib() -> float:
+    """Resident memory of this process in MiB, 0 where the system has no /proc."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+    except (OSError, ValueError, IndexError):
+        return 0.0
+    import resource
+
+    return pages * resource.getpagesize() / _MIB

@@ -1,0 +1,37 @@
+"""The service's status as the ground station gets it."""
+
+from __future__ import annotations
+
+from service.publisher.wire import StatusSample
+from service.status import ServiceStatus
+
+
+def status_sample(status: ServiceStatus) -> StatusSample:
+    """The wire's form of `status`."""
+    latency, scale, link = status.latency, status.scale, status.link
+    return StatusSample(
+        vehicle=status.vehicle,
+        state=status.state.name,
+        trouble=None if status.trouble is None else status.trouble.value,
+        uptime_s=status.uptime_s,
+        frames_per_s=status.frames_per_s,
+        obstacle_messages=status.obstacle_messages,
+        latency_ms_p50=None if latency is None else latency.p50_ms,
+        latency_ms_p95=None if latency is None else latency.p95_ms,
+        dropped_frames=status.drops.frames,
+        dropped_samples=status.drops.samples,
+        model_failures=status.model_failures,
+        scale_factor=None if scale is None else scale.factor,
+        scale_relative_sigma=None if scale is None else scale.relative_sigma,
+        scale_age_s=None if scale is None else scale.age_s,
+        height_m=status.height_m,
+        mode=status.mode,
+        armed=status.armed,
+        camera=status.camera.state.value,
+        camera_detail=status.camera.detail,
+        link_connected=link.connected,
+        autopilot=link.autopilot,
+        system_id=link.system_id,
+        link_detail=link.problem or "",
+        memory_mib=status.memory_mib,
+    )

@@ -1,0 +1,39 @@
+"""Why no distances are sent, in words that a pilot understands."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+
+class Trouble(Enum):
+    """Why depth cannot be trusted. The values are read by pilots, as STATUSTEXT of 50 characters at most."""
+
+    STARTING = "starting"
+    CAMERA_LOST = "no pictures from the camera"
+    STALE_FRAME = "pictures are too old"
+    STALLED = "depth computation stalled"
+    MODEL_FAILED = "depth network failed"
+    LINK_LOST = "autopilot not heard"
+    NO_ATTITUDE = "no attitude at picture time"
+    NO_HEIGHT = "no height above ground"
+    NO_GROUND = "no ground seen to scale depth"
+    BAD_SCALE = "scale from ground is uncertain"
+    NOT_SENT = "autopilot link takes no distances"
+    NO_DEPTH = "depth is unknown everywhere"
+
+    @property
+    def is_fault(self) -> bool:
+        """Whether a part of the service has failed, as against a vehicle that is where depth has no scale."""
+        return self in _FAULTS
+
+
+_FAULTS = frozenset(
+    {
+        Trouble.CAMERA_LOST,
+        Trouble.STALE_FRAME,
+        Trouble.STALLED,
+        Trouble.MODEL_FAILED,
+        Trouble.LINK_LOST,
+        Trouble.NOT_SENT,
+    }
+)

@@ -1,0 +1,1 @@
+"""`uavdepth watch`: scan and status of vehicles, live in a terminal."""

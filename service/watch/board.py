@@ -1,0 +1,138 @@
+"""What is known of each vehicle, and how old it is."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from enum import Enum
+
+from service.publisher import keys
+from service.publisher.wire import ScanSample, StatusSample, WireError
+
+STALE_NS = 1_000_000_000
+NO_DATA_NS = 3_000_000_000
+_MAX_VEHICLES = 200
+"""A peer that invents names must not fill the memory."""
+
+
+class Freshness(Enum):
+    """How old the newest scan is, by the viewer's own clock."""
+
+    LIVE = "live"
+    STALE = "stale"
+    NO_DATA = "no data"
+
+
+@dataclass
+class _Vehicle:
+    alive: bool = False
+    scan: ScanSample | None = None
+    scan_ns: int | None = None
+    status: StatusSample | None = None
+    status_ns: int | None = None
+    scans: int = 0
+
+
+@dataclass(frozen=True)
+class VehicleView:
+    """One vehicle at one moment.
+
+    Args:
+        name: of the vehicle.
+        alive: its Zenoh session lives (liveliness; no sign of fresh data).
+        freshness: of the newest scan.
+        age_s: since it arrived, seconds; None before the first.
+        scan: the newest scan, None if there is none or it is too old to show.
+        status: the newest status, None if there is none or it is too old to show.
+        scans: that arrived since the start.
+    """
+
+    name: str
+    alive: bool
+    freshness: Freshness
+    age_s: float | None
+    scan: ScanSample | None
+    status: StatusSample | None
+    scans: int
+
+
+class Board:
+    """Collects samples from any thread. What cannot be understood is counted and left out."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._vehicles: dict[str, _Vehicle] = {}
+        self._bad_samples = 0
+        self._last_bad = ""
+
+    @property
+    def bad_samples(self) -> int:
+        """Samples that were not what their key says."""
+        return self._bad_samples
+
+    @property
+    def last_bad(self) -> str:
+        """What was wrong with the last of them."""
+        return self._last_bad
+
+    def hear(self, key: str, payload: bytes, now_ns: int) -> None:
+        """Take one sample of a `scan` or `status` key."""
+        vehicle = keys.vehicle_of(key)
+        topic = key.rpartition("/")[2]
+        with self._lock:
+            try:
+                if vehicle is None or topic not in (keys.SCAN, keys.STATUS):
+                    raise WireError(f"key {key[:100]!r} is not one of ours")
+                if topic == keys.SCAN:
+                    scan = ScanSample.decode(payload)
+                    entry = self._entry(vehicle)
+                    entry.scan, entry.scan_ns, entry.scans = scan, now_ns, entry.scans + 1
+                else:
+                    status = StatusSample.decode(payload)
+                    entry = self._entry(vehicle)
+                    entry.status, entry.status_ns = status, now_ns
+            except WireError as error:
+                self._bad_samples += 1
+                self._last_bad = str(error)
+
+    def hear_alive(self, key: str, alive: bool) -> None:
+        """Take the coming or going of a liveliness token."""
+        vehicle = keys.vehicle_of(key)
+        if vehicle is None:
+            return
+        with self._lock:
+            try:
+                self._entry(vehicle).alive = alive
+            except WireError as error:
+                self._last_bad = str(error)
+
+    def vehicles(self, now_ns: int) -> list[VehicleView]:
+        """All vehicles by name, as they are to be shown now."""
+        with self._lock:
+            return [self._view(name, entry, now_ns) for name, entry in sorted(self._vehicles.items())]
+
+    def _entry(self, vehicle: str) -> _Vehicle:
+        entry = self._vehicles.get(vehicle)
+        if entry is None:
+            if len(self._vehicles) >= _MAX_VEHICLES:
+                raise WireError(f"more than {_MAX_VEHICLES} vehicles: {vehicle[:40]!r} is left out")
+            entry = self._vehicles[vehicle] = _Vehicle()
+        return entry
+
+    @staticmethod
+    def _view(name: str, entry: _Vehicle, now_ns: int) -> VehicleView:
+        age_ns = None if entry.scan_ns is None else now_ns - entry.scan_ns
+        if age_ns is None or age_ns > NO_DATA_NS:
+            freshness = Freshness.NO_DATA
+        else:
+            freshness = Freshness.STALE if age_ns > STALE_NS else Freshness.LIVE
+        status_fresh = entry.status_ns is not None and now_ns - entry.status_ns <= NO_DATA_NS
+        return VehicleView(
+            name=name,
+            alive=entry.alive,
+            freshness=freshness,
+            age_s=None if age_ns is None else age_ns / 1e9,
+            scan=None if freshness is Freshness.NO_DATA else entry.scan,
+            status=entry.status if status_fresh else None,
+            scans=entry.scans,
+        )

@@ -1,0 +1,124 @@
+"""The board as a terminal shows it."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from rich.console import Group, RenderableType
+from rich.markup import escape
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
+
+from service.publisher.wire import ScanSample, StatusSample
+from service.watch.board import Board, Freshness, VehicleView
+from uavdepth.obstacle_scan import SectorState
+
+_BLOCKS = " ▁▂▃▄▅▆▇█"
+_STATE_STYLES = {"ACTIVE": "green", "STANDBY": "yellow", "BOOT": "yellow", "CRITICAL": "bold red"}
+_FRESHNESS_STYLES = {
+    Freshness.LIVE: "green",
+    Freshness.STALE: "bold yellow",
+    Freshness.NO_DATA: "bold red",
+}
+
+
+def render_board(board: Board, connect: str, now_ns: int) -> RenderableType:
+    """Everything that is known, one panel a vehicle."""
+    views = board.vehicles(now_ns)
+    parts: list[RenderableType] = [_vehicle_panel(view) for view in views]
+    if not views:
+        parts.append(Text(f"no vehicle heard at {connect} yet", style="yellow"))
+    if board.bad_samples:
+        parts.append(Text(f"{board.bad_samples} samples not understood: {board.last_bad}", style="yellow"))
+    return Group(*parts)
+
+
+def board_json(board: Board, now_ns: int) -> str:
+    """Everything that is known as one line of JSON."""
+    document = {
+        "vehicles": {view.name: _vehicle_document(view) for view in board.vehicles(now_ns)},
+        "bad_samples": board.bad_samples,
+    }
+    return json.dumps(document)
+
+
+def _vehicle_document(view: VehicleView) -> dict[str, Any]:
+    scan, status = view.scan, view.status
+    return {
+        "alive": view.alive,
+        "freshness": view.freshness.value,
+        "age_s": view.age_s,
+        "nearest_m": None if scan is None else scan.scan.nearest_m,
+        "scan": None if scan is None else scan.model_dump(mode="json"),
+        "status": None if status is None else status.model_dump(mode="json"),
+        "scans": view.scans,
+    }
+
+
+def _vehicle_panel(view: VehicleView) -> Panel:
+    age = "" if view.age_s is None else f" {view.age_s:.1f} s"
+    title = Text(view.name, style="bold")
+    title.append(f"  {view.freshness.value}{age}", style=_FRESHNESS_STYLES[view.freshness])
+    if not view.alive:
+        title.append("  session gone", style="bold red")
+    rows: list[RenderableType] = []
+    if view.scan is not None:
+        rows.append(_scan_rows(view.scan))
+    rows.append(_status_rows(view.status))
+    return Panel(Group(*rows), title=title, title_align="left")
+
+
+def _scan_rows(sample: ScanSample) -> RenderableType:
+    """One column an element that is known, from left to right as the pilot looks."""
+    if not sample.trusted:
+        return Text(f"NOT TRUSTED: {sample.trouble}", style="bold red")
+    scan = sample.scan
+    bearing = (scan.bearing_deg + 180) % 360 - 180
+    order = [index for index in bearing.argsort() if scan.state[index] != SectorState.UNKNOWN]
+    heading, bars = Text("bearing  "), Text("distance ")
+    metres, words = Text("metres   "), Text("nearest  ")
+    for index in order:
+        heading.append(f"{bearing[index]:+5.0f}", style="dim")
+        if scan.state[index] == SectorState.CLEAR:
+            bars.append("    ·", style="green")
+            metres.append("clear"[:5], style="green")
+            continue
+        distance = float(scan.distance_m[index])
+        near = 1 - min(distance / scan.max_distance_m, 1.0)
+        style = "bold red" if distance < scan.max_distance_m / 4 else "yellow"
+        bars.append("    " + _BLOCKS[1 + round(near * (len(_BLOCKS) - 2))], style=style)
+        metres.append(f"{distance:5.1f}", style=style)
+    nearest = scan.nearest_m
+    if nearest is None:
+        words.append(f"nothing within {scan.max_distance_m:g} m of what is seen", style="green")
+    else:
+        words.append(f"{nearest:.1f} m", style="bold")
+    return Group(heading, bars, metres, words)
+
+
+def _status_rows(status: StatusSample | None) -> RenderableType:
+    if status is None:
+        return Text("no status", style="yellow")
+    table = Table.grid(padding=(0, 2))
+    state = Text(status.state, style=_STATE_STYLES.get(status.state, "bold red"))
+    if status.trouble:
+        state.append(f" ({status.trouble})")
+    latency = "-"
+    if status.latency_ms_p50 is not None and status.latency_ms_p95 is not None:
+        latency = f"{status.latency_ms_p50:.0f} / {status.latency_ms_p95:.0f} ms"
+    scale = "-"
+    if status.scale_factor is not None and status.scale_relative_sigma is not None:
+        scale = f"{status.scale_factor:.2f} ±{100 * status.scale_relative_sigma:.0f} %"
+    table.add_row("state", state, "latency p50 / p95", latency)
+    table.add_row("rate", f"{status.frames_per_s:.1f}/s", "scale", scale)
+    autopilot = "not connected"
+    if status.link_connected:
+        armed = {True: "armed", False: "disarmed", None: ""}[status.armed]
+        autopilot = f"{status.autopilot or '?'} {status.mode or ''} {armed}".strip()
+    height = "-" if status.height_m is None else f"{status.height_m:.1f} m"
+    table.add_row("autopilot", escape(autopilot), "height", height)
+    table.add_row("camera", escape(status.camera), "messages", str(status.obstacle_messages))
+    notes = [text for text in (status.camera_detail, status.link_detail) if text]
+    return Group(table, *(Text(note, style="yellow") for note in notes))
