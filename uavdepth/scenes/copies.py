@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 from uavdepth.scenes.mesh import Mesh, MeshBuilder
 
+_WIDTH = (0.85, 1.15)
+"""Slimmest and widest copies against the template."""
+
 
 @dataclass(frozen=True)
 class Template:
@@ -29,6 +32,12 @@ class Template:
         builder = MeshBuilder()
         make(builder)
         return cls(builder.build(), height_m)
+
+    @property
+    def reach(self) -> float:
+        """How far copies may stretch sideways from their foot, as a part of their height."""
+        level = self.mesh.vertices_m[:, :2]
+        return float(np.linalg.norm(level, axis=1).max()) * _WIDTH[1] / self.height_m
 
 
 def add_copies(
@@ -52,7 +61,7 @@ def add_copies(
         return
     mesh = template.mesh
     scale = np.asarray(heights_m, float) / template.height_m
-    width = scale * rng.uniform(0.85, 1.15, count)
+    width = scale * rng.uniform(*_WIDTH, count)
     turn = rng.uniform(0.0, 2 * np.pi, count)
     cosine, sine = (width * np.cos(turn))[:, None], (width * np.sin(turn))[:, None]
     shade = rng.uniform(0.8, 1.12, (count, 1, 1)) * rng.uniform(0.94, 1.06, (count, 1, 3))

@@ -1,8 +1,9 @@
-"""The scene `forest`: trees of many kinds on flat ground, undergrowth, fallen logs, a trail and a clearing."""
+"""The scene `forest`: many kinds of trees on flat ground, undergrowth, fallen logs, a trail, a clearing."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,11 +25,13 @@ from uavdepth.scenes.weather import draw_weather
 
 _EXTENT_M = 68.0
 _PLANTED_M = 78.0
-_FAR_M = 190.0
+_FAR_M = 170.0
 _GROUND_REACH_M = 600.0
 _CORRIDOR_HALF_WIDTH_M = 3.2
 _CLEARING_M = 5.0
 _WALL_HALF_WIDTH_M = 14.0
+_VARIETIES = 6
+"""Templates of each kind of tree."""
 
 
 @dataclass(frozen=True)
@@ -53,28 +56,28 @@ _WOODS = (
         {"broadleaf": 0.75, "birch": 0.12, "dead": 0.05, "conifer": 0.08},
         ("grass", "leaf_litter", "moss"),
         0.05,
-        (4.4, 6.0),
+        (4.8, 6.6),
     ),
     _Wood(
         {"conifer": 0.85, "birch": 0.08, "dead": 0.07},
         ("moss", "needle_floor", "needle_floor"),
         0.0,
-        (3.8, 5.2),
+        (4.4, 6.0),
     ),
-    _Wood({"birch": 0.65, "broadleaf": 0.2, "conifer": 0.15}, ("grass", "grass", "moss"), 0.25, (4.0, 5.6)),
+    _Wood({"birch": 0.65, "broadleaf": 0.2, "conifer": 0.15}, ("grass", "grass", "moss"), 0.25, (4.4, 6.2)),
     _Wood(
         {"broadleaf": 0.6, "birch": 0.25, "poplar": 0.1, "dead": 0.05},
         ("leaf_litter", "leaf_litter", "soil"),
         0.8,
-        (4.4, 6.0),
+        (4.8, 6.6),
     ),
     _Wood(
         {"conifer": 0.4, "broadleaf": 0.4, "poplar": 0.1, "birch": 0.1},
         ("needle_floor", "leaf_litter", "grass"),
         0.1,
-        (4.2, 5.6),
+        (4.6, 6.2),
     ),
-    _Wood({"snowy_conifer": 0.75, "dead": 0.25}, ("snow", "snow", "needle_floor"), 0.0, (4.0, 5.6)),
+    _Wood({"snowy_conifer": 0.75, "dead": 0.25}, ("snow", "snow", "needle_floor"), 0.0, (4.4, 6.2)),
 )
 _WOOD_SHARES = (0.22, 0.2, 0.17, 0.14, 0.17, 0.1)
 
@@ -120,12 +123,10 @@ def _trail_east_m(bends: LandNoise, north_m: ArrayLike) -> Values:
 
 
 def _add_floor(builder: MeshBuilder, rng: np.random.Generator, wood: _Wood) -> None:
-    lines = stretched_axis(_EXTENT_M + 12.0, 0.9, _GROUND_REACH_M, growth=1.3)
+    lines = stretched_axis(_EXTENT_M + 12.0, 1.1, _GROUND_REACH_M, growth=1.3)
     north, east = np.meshgrid(lines, lines, indexing="ij")
     # Corners off the grid's lines hide the grid where one texture meets another.
-    shake = np.minimum(np.hypot(north, east) < _EXTENT_M + 10.0, True) * rng.uniform(
-        -0.28, 0.28, (2, *north.shape)
-    )
+    shake = (np.hypot(north, east) < _EXTENT_M + 10.0) * rng.uniform(-0.28, 0.28, (2, *north.shape))
     vertices = np.stack([north + shake[0], east + shake[1], np.zeros_like(north)], axis=-1).reshape(-1, 3)
     rows = len(lines)
     corner = (np.arange(rows - 1)[:, None] * rows + np.arange(rows - 1)[None, :]).ravel()
@@ -156,7 +157,7 @@ def _jittered_places(rng: np.random.Generator, reach_m: float, spacing_m: float)
 
 
 def _is_free(places: NDArray[np.float64], reach_m: ArrayLike, wall_north_m: float) -> NDArray[np.bool_]:
-    """(K,) True where a thing of that reach stands neither in the clearing nor in the corridor or the wall."""
+    """(K,) True where a thing of that reach keeps clearing and corridor free, and stands not in the wall."""
     north, east = places[:, 0], np.abs(places[:, 1])
     reach = np.asarray(reach_m, float)
     clear = np.hypot(north, east) > _CLEARING_M + reach
@@ -175,18 +176,15 @@ def _add_trees(builder: MeshBuilder, rng: np.random.Generator, wood: _Wood, wall
     glades = LandNoise(rng, 24.0).at(places[:, 0], places[:, 1])
     places = places[glades + rng.normal(0.0, 0.15, len(places)) > -0.42]
     heights = np.clip(rng.lognormal(np.log(10.5), 0.34, len(places)), 4.5, 20.0)
-    # Crowns reach as far as a quarter of a tree's height.
-    places_free = _is_free(places, 0.27 * heights, wall_north_m)
-    places, heights = places[places_free], heights[places_free]
     kinds = list(wood.kinds)
     species = rng.choice(len(kinds), size=len(places), p=list(wood.kinds.values()))
-    variety = rng.integers(6, size=len(places))
+    variety = rng.integers(_VARIETIES, size=len(places))
     for number, kind in enumerate(kinds):
-        for which in range(6):
+        for which in range(_VARIETIES):
+            template = _tree_template(rng, kind, float(rng.uniform(7.0, 14.0)), wood.autumn)
             here = (species == number) & (variety == which)
-            if here.any():
-                template = _tree_template(rng, kind, float(rng.uniform(7.0, 14.0)), wood.autumn)
-                add_copies(builder, rng, template, _on_ground(places[here]), heights[here])
+            here &= _is_free(places, template.reach * heights, wall_north_m)
+            add_copies(builder, rng, template, _on_ground(places[here]), heights[here])
 
 
 def _tree_template(rng: np.random.Generator, kind: TreeKind, height_m: float, autumn: float) -> Template:
@@ -228,14 +226,16 @@ def _add_undergrowth(
 ) -> None:
     for _ in range(5):
         height = rng.uniform(0.7, 1.8)
-        bush = Template.of(lambda b, h=height: add_bush(b, rng, 0.0, 0.0, 0.0, h, wood.autumn), height)  # type: ignore[misc]
+        plant = partial(add_bush, rng=rng, north_m=0.0, east_m=0.0, ground_down_m=0.0, height_m=height)
+        bush = Template.of(partial(plant, autumn=wood.autumn), height)
         places = rng.uniform(-_PLANTED_M, _PLANTED_M, (int(rng.integers(12, 40)), 2))
         places = places[_is_free(places, 1.2, wall_north_m)]
         heights = np.clip(rng.lognormal(0.0, 0.4, len(places)), 0.4, 2.6)
         add_copies(builder, rng, bush, _on_ground(places), heights)
     if "snow" not in wood.floors:
         for _ in range(4):
-            tuft = Template.of(lambda b: add_tuft(b, rng, 0.5, str(rng.choice(["grass", "leaves"]))), 0.5)
+            blades = str(rng.choice(["grass", "leaves"]))
+            tuft = Template.of(partial(add_tuft, rng=rng, height_m=0.5, texture=blades), 0.5)
             places = rng.uniform(-_EXTENT_M, _EXTENT_M, (220, 2))
             places = places[np.abs(places[:, 1]) > 1.5]
             add_copies(builder, rng, tuft, _on_ground(places), rng.uniform(0.25, 0.7, len(places)))
@@ -255,13 +255,12 @@ def _scattered(
 
 def _add_far_trees(builder: MeshBuilder, rng: np.random.Generator, wood: _Wood) -> None:
     """The wood goes on to the horizon."""
-    places = _jittered_places(rng, _FAR_M, 7.5)
+    places = _jittered_places(rng, _FAR_M, 8.0)
     places = places[np.abs(places).max(axis=1) > _PLANTED_M]
-    conifers = wood.kinds.get("conifer", 0.0) + wood.kinds.get("snowy_conifer", 0.0)
-    which = rng.integers(6, size=len(places))
-    for number in range(6):
-        height = 12.0
-        conifer = bool(rng.random() < conifers)
-        template = Template.of(lambda b, c=conifer: add_far_tree(b, rng, height, c), height)  # type: ignore[misc]
+    kinds = list(wood.kinds)
+    which = rng.integers(_VARIETIES, size=len(places))
+    for number in range(_VARIETIES):
+        kind = kinds[int(rng.choice(len(kinds), p=list(wood.kinds.values())))]
+        template = Template.of(partial(add_far_tree, rng=rng, height_m=12.0, kind=kind), 12.0)
         here = places[which == number]
         add_copies(builder, rng, template, _on_ground(here), rng.uniform(8.0, 18.0, len(here)))

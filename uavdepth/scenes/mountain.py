@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from uavdepth.scenes.copies import Template, add_copies
 from uavdepth.scenes.description import SceneDescription
 from uavdepth.scenes.mesh import MeshBuilder
 from uavdepth.scenes.rocks import add_boulder
@@ -15,10 +17,12 @@ from uavdepth.scenes.terrain import LandNoise, TerrainGrid, Values, fractal_land
 from uavdepth.scenes.vegetation import TreeKind, add_bush, add_tree
 from uavdepth.scenes.weather import draw_weather
 
-_CORE_M, _SPACING_M, _REACH_M = 160.0, 1.5, 1300.0
+_CORE_M, _SPACING_M, _REACH_M = 156.0, 1.6, 1100.0
 _EXTENT_M = 145.0
 _CORRIDOR_HALF_WIDTH_M = 6.0
-_TREES, _BOULDERS, _BUSHES = 330, 260, 60
+_TREES, _BOULDERS, _BUSHES, _OUTCROPS = 330, 220, 60, 90
+_VARIETIES = 5
+"""Templates of each kind of tree."""
 
 
 class _Valley:
@@ -41,11 +45,15 @@ class _Valley:
         self._steepness = rng.uniform(0.35, 0.75)
         self._peak_m = rng.uniform(45.0, 110.0)
 
+    def bend_north_m(self, east_m: ArrayLike) -> Values:
+        """How far the whole valley swerves from the east-west line."""
+        return np.asarray(self._bend * (np.asarray(east_m, float) / 100.0) ** 2)
+
     def river_north_m(self, east_m: ArrayLike) -> Values:
         """The river's middle line."""
         east = np.asarray(east_m, float)
         meander = 9.0 * self._meander.at(np.zeros_like(east), east)
-        return np.asarray(-self._river_south_m + meander + self._bend * (east / 100.0) ** 2)
+        return np.asarray(-self._river_south_m + meander + self.bend_north_m(east))
 
     def river_half_m(self, east_m: ArrayLike) -> Values:
         """Half the river's width."""
@@ -57,7 +65,7 @@ class _Valley:
     def height_m(self, north: Values, east: Values) -> Values:
         """Heights of land and river bed, 0 at the origin."""
         rng = self._rng
-        across = north - self._bend * (east / 100.0) ** 2
+        across = north - self.bend_north_m(east)
         away = 1.0 - np.exp(-((east / 18.0) ** 2))
         foot = self.cliff_north_m + 12.0 * away * self._wiggle.at(np.zeros_like(east), east)
         tall = self.cliff_height_m * (1.0 + away * 0.9 * self._wiggle.at(np.full_like(east, 500.0), east))
@@ -67,12 +75,14 @@ class _Valley:
 
         north_rise = np.maximum(beyond - 5.0, 0.0)
         south_rise = np.maximum(-across - self._river_south_m - 28.0, 0.0)
+        far = smooth_step(np.hypot(north, east), 160.0, 400.0)
         ridges = fractal_land(rng, north, east, 170.0, 6, ridged=True)
+        # The grid is wide out there: only broad ridges, or its lines would show as spikes.
+        ridges += far * (fractal_land(rng, north, east, 420.0, 2, ridged=True) - ridges)
         slope = self._steepness * (_eased(north_rise) + _eased(south_rise))
         mountain = slope * (0.35 + 0.9 * ridges)
-        far = smooth_step(np.hypot(north, east), 150.0, 700.0)
         massif = (
-            smooth_step(north_rise + south_rise, 20.0, 160.0) * self._peak_m * ridges * (0.45 + 1.6 * far)
+            smooth_step(north_rise + south_rise, 20.0, 160.0) * self._peak_m * ridges * (0.45 + 2.0 * far)
         )
 
         corridor = np.exp(-((east / 12.0) ** 4)) * smooth_step(north, -14.0, -6.0)
@@ -103,7 +113,7 @@ def build(seed: int) -> SceneDescription:
     lines = stretched_axis(_CORE_M, _SPACING_M, _REACH_M)
     north, east = np.meshgrid(lines, lines, indexing="ij")
     grid = TerrainGrid(lines, lines, valley.height_m(north, east))
-    snow_line_m = float(rng.choice([-30.0, 8.0, 28.0, 55.0], p=[0.25, 0.25, 0.3, 0.2]))
+    snow_line_m = float(rng.choice([-30.0, 8.0, 28.0, 55.0], p=[0.2, 0.2, 0.3, 0.3]))
 
     builder = MeshBuilder()
     _add_land(builder, rng, grid, valley, snow_line_m)
@@ -115,6 +125,7 @@ def build(seed: int) -> SceneDescription:
         wet = off <= valley.river_half_m(east_m)
         return np.asarray(np.where(wet, np.maximum(land, valley.water_m), land))
 
+    _add_outcrops(builder, rng, grid, valley)
     _add_boulders(builder, rng, grid, valley)
     _add_plants(builder, rng, grid, valley, snow_line_m)
     weather = draw_weather(rng, (0.0006, 0.004))
@@ -141,19 +152,19 @@ def _add_land(
     builder: MeshBuilder, rng: np.random.Generator, grid: TerrainGrid, valley: _Valley, snow_line_m: float
 ) -> None:
     vertices, faces = grid.triangles()
+    slope = np.hypot(*np.gradient(grid.height_m, grid.north_m, grid.east_m)).ravel()
+    steep_deg = np.degrees(np.arctan(slope[faces].mean(axis=1)))
     corners = vertices[faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    steep_deg = np.degrees(np.arccos(np.abs(normal[:, 2]) / np.linalg.norm(normal, axis=1)))
     middle = corners.mean(axis=1)
     north, east, height = middle[:, 0], middle[:, 1], -middle[:, 2]
     patches = fractal_land(rng, north, east, 22.0, 4)
-    fine = fractal_land(rng, north, east, 5.0, 2)
+    fine = fractal_land(rng, north, east, 8.0, 2)
 
     texture = np.full(len(faces), "grass", dtype="<U8")
     texture[patches + 0.5 * fine > 0.55] = "soil"
     texture[steep_deg + 9.0 * patches + 5.0 * fine > 31.0] = "scree"
-    texture[steep_deg + 8.0 * patches + 4.0 * fine > 42.0] = "rock"
-    snowy = (height + 14.0 * patches + 5.0 * fine > snow_line_m) & (steep_deg + 8.0 * fine < 47.0)
+    texture[steep_deg + 7.0 * patches + 3.0 * fine > 42.0] = "rock"
+    snowy = (height + 14.0 * patches + 5.0 * fine > snow_line_m) & (steep_deg + 4.0 * fine < 46.0)
     texture[snowy] = "snow"
     off = np.abs(north - valley.river_north_m(east)) - valley.river_half_m(east)
     texture[(off < 2.5 + 2.0 * patches) & (height < valley.water_m + 1.1)] = "gravel"
@@ -167,6 +178,19 @@ def _add_land(
         part = texture == name
         used, local = np.unique(faces[part], return_inverse=True)
         builder.add(vertices[used], local.reshape(-1, 3), uv[part], str(name), tint[part], smooth=True)
+
+
+def _add_outcrops(builder: MeshBuilder, rng: np.random.Generator, grid: TerrainGrid, valley: _Valley) -> None:
+    """Blocks that stand out of the northern face, which a grid of heights cannot show."""
+    for _ in range(_OUTCROPS):
+        east = rng.normal(0.0, 45.0)
+        north = valley.cliff_north_m + float(valley.bend_north_m(east)) + rng.uniform(1.0, 12.0)
+        if _steepness(grid, north, east) < 0.8:
+            continue
+        size = rng.uniform(2.0, 6.0)
+        behind = 0.25 * size
+        down = -float(grid.at(north, east)) + 0.35 * size
+        add_boulder(builder, rng, north + behind, east, down, size, sunk=0.1, tint=rng.uniform(0.85, 1.1))
 
 
 def _add_river(builder: MeshBuilder, valley: _Valley) -> None:
@@ -208,7 +232,7 @@ def _add_boulders(builder: MeshBuilder, rng: np.random.Generator, grid: TerrainG
         east = rng.uniform(-150.0, 150.0)
         place = rng.random()
         if place < 0.35:
-            north = valley.cliff_north_m + valley._bend * (east / 100.0) ** 2 + rng.normal(-3.0, 6.0)
+            north = valley.cliff_north_m + float(valley.bend_north_m(east)) + rng.normal(-3.0, 6.0)
         elif place < 0.6:
             north = float(valley.river_north_m(east)) + rng.normal(0.0, 9.0)
         else:
@@ -223,29 +247,37 @@ def _add_plants(
 ) -> None:
     groves = LandNoise(rng, 45.0)
     tree_line_m = rng.uniform(30.0, 60.0)
-    broadleaf = rng.random() < 0.4
+    broadleaf = 0.25 if rng.random() < 0.4 else 0.03
+    crowd: dict[TreeKind, list[tuple[float, float, float]]] = {}
     planted = 0
-    for _ in range(_TREES * 6):
+    for north, east in rng.uniform(-155.0, 155.0, (_TREES * 6, 2)):
         if planted >= _TREES:
             break
-        north, east = rng.uniform(-155.0, 155.0, 2)
         height = float(grid.at(north, east))
         if groves.at(north, east) + rng.normal(0.0, 0.25) < 0.1 or height > tree_line_m + rng.normal(
             0.0, 8.0
         ):
             continue
-        if not _may_grow(grid, valley, north, east, reach_m=3.0):
+        if not _may_grow(grid, valley, north, east, reach_m=3.5):
             continue
-        snowy = height > snow_line_m + rng.normal(4.0, 5.0)
-        kind: TreeKind = "snowy_conifer" if snowy else "conifer"
-        if not snowy and rng.random() < (0.25 if broadleaf else 0.03):
+        kind: TreeKind = "conifer"
+        if height > snow_line_m + rng.normal(4.0, 5.0):
+            kind = "snowy_conifer"
+        elif rng.random() < broadleaf:
             kind = "birch" if rng.random() < 0.5 else "broadleaf"
         elif rng.random() < 0.03:
             kind = "dead"
-        add_tree(builder, rng, north, east, -height, rng.uniform(4.0, 15.0), kind)
+        crowd.setdefault(kind, []).append((north, east, -height))
         planted += 1
-    for _ in range(_BUSHES):
-        north, east = rng.uniform(-130.0, 130.0, 2)
+    for kind, feet in crowd.items():
+        which = rng.integers(_VARIETIES, size=len(feet))
+        for number in range(_VARIETIES):
+            height = rng.uniform(7.0, 12.0)
+            make = partial(add_tree, rng=rng, north_m=0.0, east_m=0.0, ground_down_m=0.0, height_m=height)
+            template = Template.of(partial(make, kind=kind), height)
+            here = np.array(feet)[which == number]
+            add_copies(builder, rng, template, here, rng.uniform(4.0, 14.0, len(here)))
+    for north, east in rng.uniform(-130.0, 130.0, (_BUSHES, 2)):
         height = float(grid.at(north, east))
         if height < min(snow_line_m, tree_line_m) and _may_grow(grid, valley, north, east, reach_m=1.5):
             add_bush(builder, rng, north, east, -height, rng.uniform(0.5, 2.0))

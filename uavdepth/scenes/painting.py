@@ -51,7 +51,7 @@ def ramp(values: NDArray[np.floating], stops: ArrayLike, colors_bgr: ArrayLike) 
 def blend(below: Picture, above: ArrayLike, amount: NDArray[np.floating]) -> Picture:
     """`above` (a picture or one colour) over `below` where `amount` (S, S) is 1."""
     weight = np.clip(amount, 0.0, 1.0).astype(np.float32)[..., None]
-    return below * (1 - weight) + np.asarray(above, np.float32) * weight
+    return np.asarray(below * (1 - weight) + np.asarray(above, np.float32) * weight, np.float32)
 
 
 def scatter(

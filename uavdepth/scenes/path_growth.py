@@ -25,6 +25,15 @@ _BRAKING_MPS2 = 1.6
 _CLIMB_LIMIT_MPS = 2.5
 _START_CANDIDATES = 128
 _MAX_STEPS_BACK = 60
+_AROUND = np.array(
+    [
+        (n, e, d)
+        for n in (-1.0, 0.0, 1.0)
+        for e in (-1.0, 0.0, 1.0)
+        for d in (-1.0, 0.0, 1.0)
+        if (n, e, d) != (0, 0, 0)
+    ]
+)
 _HEADINGS = np.arange(24) * (2 * math.pi / 24)
 
 
@@ -219,7 +228,9 @@ class PathGrower:
             height = -point[2] - self._world.ground_height_m(point[0], point[1])
             if not MIN_HEIGHT_M + 0.1 < height < MAX_HEIGHT_M - 0.5:
                 return False
-        return all(self._world.clearance_m(point.tolist()) > _MARGIN_M for point in points)
+        # Rays all around are quick; the exact clearance of the whole path is tested at the end.
+        origins = np.repeat(np.array(points), len(_AROUND), axis=0)
+        return bool(self._rays(origins, np.tile(_AROUND, (len(points), 1))).min() > _MARGIN_M)
 
     def _leaves(self, here: NDArray[np.float64]) -> bool:
         ahead = here[:2] + 6.0 * np.array([math.cos(self._goal_rad), math.sin(self._goal_rad)])

@@ -55,12 +55,12 @@ def _snow(rng: np.random.Generator) -> NDArray[np.uint8]:
 def _rock(rng: np.random.Generator) -> NDArray[np.uint8]:
     """Layered grey stone, cracked into blocks of half a metre, with lichen."""
     size = 1024
-    layers = fractal_noise(rng, size, (14, 3), 4, 0.6)
-    blotches = fractal_noise(rng, size, 5, 6, 0.65)
-    border, index = _blocks(rng, size, 60)
-    small_border, _ = _blocks(rng, size, 420)
-    shade = rng.uniform(0.85, 1.12, 60).astype(np.float32)[index]
-    tone = (0.5 + 0.12 * layers + 0.14 * blotches) * shade
+    layers = fractal_noise(rng, size, (26, 5), 4, 0.6)
+    blotches = fractal_noise(rng, size, 13, 5, 0.7)
+    border, index = _blocks(rng, size, 130)
+    small_border, _ = _blocks(rng, size, 700)
+    shade = rng.uniform(0.84, 1.13, 130).astype(np.float32)[index]
+    tone = (0.52 + 0.10 * layers + 0.12 * blotches) * shade
     warm = rng.uniform(-1.0, 1.0)
     dark, middle, light = (
         (46, 48, 50),
@@ -69,9 +69,9 @@ def _rock(rng: np.random.Generator) -> NDArray[np.uint8]:
     )
     picture = ramp(tone, [0.1, 0.5, 0.95], [dark, middle, light])
     rough = 0.05 * np.abs(smooth_noise(rng, size, 40))
-    picture *= (0.45 + 0.55 * np.clip((border - rough) / 0.07, 0, 1))[..., None]
+    picture *= (0.45 + 0.55 * np.clip((border - rough) / 0.06, 0, 1))[..., None]
     picture *= (0.72 + 0.28 * np.clip((small_border - rough) / 0.10, 0, 1))[..., None]
-    lichen = fractal_noise(rng, size, 12, 4, 0.7) - 1.5
+    lichen = fractal_noise(rng, size, 20, 4, 0.7) - 1.5
     picture = blend(picture, (96, 165, 168), np.clip(lichen * 2.0, 0, 0.55))
     return finish(picture, rng, 7.0, 0.03)
 
@@ -80,7 +80,7 @@ def _grass(rng: np.random.Generator) -> NDArray[np.uint8]:
     size = 512
     dry = fractal_noise(rng, size, 4, 3)
     picture = ramp(dry, [-1.5, 0, 1.8], [(24, 62, 42), (34, 84, 62), (62, 116, 112)])
-    greens = [(44, 120, 84), (38, 104, 66), (66, 140, 112), (84, 150, 142), (52, 128, 76)]
+    greens = [(54, 118, 92), (46, 102, 74), (74, 138, 118), (92, 150, 146), (60, 124, 88)]
     scatter(picture, rng, _BLADE, 9000, (12, 34), greens, (0.55, 1.2))
     flower = [(230, 240, 245), (60, 215, 240), (215, 150, 200)]
     scatter(picture, rng, _STONE, int(rng.integers(0, 60)), (4, 8), flower, (0.9, 1.0))
@@ -101,7 +101,7 @@ def _leaf_litter(rng: np.random.Generator) -> NDArray[np.uint8]:
     size = 1024
     earth = fractal_noise(rng, size, 5, 5)
     picture = ramp(earth, [-2, 0, 2], [(20, 28, 38), (34, 48, 64), (54, 74, 96)])
-    browns = [(44, 82, 130), (38, 66, 104), (62, 104, 150), (30, 60, 122), (84, 128, 164), (52, 92, 112)]
+    browns = [(56, 88, 124), (46, 70, 100), (74, 110, 146), (44, 68, 114), (96, 132, 160), (62, 92, 108)]
     scatter(picture, rng, _LEAF, 3600, (17, 38), browns, (0.5, 1.2), shadow=0.55)
     scatter(
         picture, rng, _TWIG * [1.0, 0.6], 40, (50, 200), [(46, 60, 78), (70, 88, 104)], (0.7, 1.1), shadow=0.5
@@ -189,7 +189,7 @@ def _leaves(rng: np.random.Generator) -> NDArray[np.uint8]:
     greens = [(46, 122, 84), (38, 104, 70), (58, 138, 104), (66, 150, 126), (44, 112, 62)]
     scatter(picture, rng, _LEAF, 1500, (13, 30), greens, (0.4, 1.2), shadow=0.6)
     clusters = fractal_noise(rng, size, 6, 2)
-    picture *= np.clip(1.0 + 0.24 * clusters, 0.4, 1.5)[..., None]
+    picture *= np.clip(1.22 + 0.24 * clusters, 0.5, 1.7)[..., None]
     return finish(picture, rng, 5.0, 0.05)
 
 
@@ -199,7 +199,7 @@ def _needle_layers(rng: np.random.Generator, size: int) -> Picture:
     greens = [(46, 82, 44), (38, 70, 36), (60, 98, 56), (70, 108, 74)]
     scatter(picture, rng, _SPRIG, 2600, (18, 46), greens, (0.4, 1.25), shadow=0.5)
     scatter(picture, rng, _TWIG, 2400, (10, 22), greens, (0.8, 1.4))
-    return picture
+    return picture * np.float32(1.15)
 
 
 def _needles(rng: np.random.Generator) -> NDArray[np.uint8]:
@@ -254,7 +254,7 @@ def _sand(rng: np.random.Generator) -> NDArray[np.uint8]:
 
 NATURE_TEXTURES: dict[str, TextureSource] = {
     "snow": TextureSource(_snow, 6.0),
-    "rock": TextureSource(_rock, 5.0),
+    "rock": TextureSource(_rock, 8.0),
     "grass": TextureSource(_grass, 2.5),
     "moss": TextureSource(_moss, 2.0),
     "leaf_litter": TextureSource(_leaf_litter, 3.0),

@@ -286,15 +286,21 @@ def add_tuft(builder: MeshBuilder, rng: np.random.Generator, height_m: float, te
     )
 
 
-def add_far_tree(builder: MeshBuilder, rng: np.random.Generator, height_m: float, conifer: bool) -> None:
+def add_far_tree(builder: MeshBuilder, rng: np.random.Generator, height_m: float, kind: TreeKind) -> None:
     """Grow a tree of few triangles at the origin, for where it is only seen from afar."""
-    crown = "needles" if conifer else "leaves"
-    lift = np.array([0.0, 0.0, -(0.55 if conifer else 0.62) * height_m])
-    width = (0.16 if conifer else 0.24) * height_m
-    vertices, faces = lumpy_sphere(rng, 1, (width, width, (0.47 if conifer else 0.36) * height_m), 0.2, 0.08)
-    if conifer:
-        taper = 0.25 + 0.75 * (vertices[:, 2:] / (0.47 * height_m) + 1.0) / 2
-        vertices = vertices * np.where([True, True, False], taper * 1.5, 1.0)
-    builder.add(vertices + lift, faces, box_uv(vertices, faces), crown, _leaf_tint(rng, 0.0))
-    line = np.array([[0.0, 0.0, _ROOT_DEPTH_M], [0.0, 0.0, -0.5 * height_m]])
-    _add_tube(builder, line, [0.02 * height_m, 0.014 * height_m], 4, "bark", np.ones(3))
+    if kind in ("conifer", "snowy_conifer"):
+        crown = "needles" if kind == "conifer" else "snowy_needles"
+        for low in (0.1, 0.36, 0.62):
+            turn = np.arange(7) * 2 * np.pi / 7 + rng.uniform(0, 1)
+            out = height_m * (0.2 - 0.17 * low) * rng.uniform(0.8, 1.2, 7)
+            ring = np.column_stack([out * np.cos(turn), out * np.sin(turn), np.full(7, -low * height_m)])
+            cone = np.vstack([ring, [0.0, 0.0, -min(low + 0.45, 1.0) * height_m]])
+            faces = np.stack([np.arange(7), (np.arange(7) + 1) % 7, np.full(7, 7)], axis=1)
+            builder.add(cone, faces, box_uv(cone, faces), crown, np.full(3, rng.uniform(0.7, 1.0)))
+    elif kind != "dead":
+        width, half = 0.24 * height_m, 0.36 * height_m
+        vertices, faces = lumpy_sphere(rng, 1, (width, width, half), 0.2, 0.08)
+        vertices = vertices - [0.0, 0.0, 0.62 * height_m]
+        builder.add(vertices, faces, box_uv(vertices, faces), "leaves", _leaf_tint(rng, 0.0))
+    line = np.array([[0.0, 0.0, _ROOT_DEPTH_M], [0.0, 0.0, -0.6 * height_m]])
+    _add_tube(builder, line, [0.02 * height_m, 0.01 * height_m], 4, "bark", np.ones(3))
