@@ -56,42 +56,49 @@ class BandView:
         half = SECTOR_WIDTH_DEG / 2
         offsets = np.linspace(-half, half, SLICES)
         bearings = np.radians(sector_bearings_deg().astype(np.float64)[:, None] + offsets)
-        shape = (SECTOR_COUNT, SLICES, HEIGHTS)
-        targets = np.empty((*shape, 3))
-        targets[..., 0] = max_distance_m * np.cos(bearings)[..., None]
-        targets[..., 1] = max_distance_m * np.sin(bearings)[..., None]
-        targets[..., 2] = np.linspace(-above_m, below_m, HEIGHTS)
-        self._targets_level = targets.reshape(-1, 3)
+        targets = np.empty((3, SECTOR_COUNT, SLICES, HEIGHTS), dtype=np.float32)
+        targets[0] = max_distance_m * np.cos(bearings)[..., None]
+        targets[1] = max_distance_m * np.sin(bearings)[..., None]
+        targets[2] = np.linspace(-above_m, below_m, HEIGHTS)
+        self._targets_level = targets.reshape(3, -1)
 
     def probe(self, level_from_body: NDArray[np.float64]) -> BandProbe:
         """The pixels for an attitude's `level_from_body`; directions outside the picture have none."""
-        body = self._targets_level @ level_from_body - self._mount.position_body_m
-        points = body @ self._mount.body_from_camera
-        cell = np.flatnonzero(points[:, 2] > 0.05 * np.linalg.norm(points, axis=1))
-        flat = points[cell, :2] / points[cell, 2:]
+        camera_from_body = self._mount.body_from_camera.T
+        camera_from_level = (camera_from_body @ level_from_body.T).astype(np.float32)
+        points = camera_from_level @ self._targets_level
+        points -= (camera_from_body @ self._mount.position_body_m).astype(np.float32)[:, None]
+        # Less than 3 degrees from the image plane no pinhole camera has a pixel.
+        cell = np.flatnonzero(points[2] > 0.05 * np.hypot(points[0], points[1]))
+        points = points[:, cell]
+        flat = points[:2] / points[2]
         u, v = self._pixels(flat)
         inside = (u >= 0) & (u < self._camera.width) & (v >= 0) & (v < self._camera.height)
-        cell, flat, u, v = cell[inside], flat[inside], u[inside], v[inside]
+        cell, flat, u, v = cell[inside], flat[:, inside], u[inside], v[inside]
         if any(self._camera.distortion):
             # Far outside the picture a distortion polynomial folds back into it: believe a pixel
             # only if its own ray looks there.
-            ray = self._camera.normalized_rays[v, u, :2]
-            span = 1.5 * np.array([1 / self._camera.fx, 1 / self._camera.fy])
-            looks_there = (np.abs(ray - flat) <= span * (1 + np.abs(flat))).all(axis=1)
+            ray = self._camera.normalized_rays[v, u, :2].T
+            span = 1.5 * np.array([[1 / self._camera.fx], [1 / self._camera.fy]])
+            looks_there = (np.abs(ray - flat) <= span * (1 + np.abs(flat))).all(axis=0)
             cell, u, v = cell[looks_there], u[looks_there], v[looks_there]
         return BandProbe(v * self._camera.width + u, cell)
 
-    def _pixels(self, flat: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    def _pixels(self, flat: NDArray[np.float32]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Column and row of (2, N) directions with z = 1; outside the picture anything outside it."""
         camera = self._camera
-        if any(camera.distortion) and len(flat):
-            rays = np.concatenate([flat, np.ones((len(flat), 1))], axis=1)
+        if any(camera.distortion) and flat.size:
+            rays = np.concatenate([flat, np.ones((1, flat.shape[1]))]).T
             zero = np.zeros(3)
-            pixels, _ = cv2.projectPoints(rays, zero, zero, camera.matrix, np.array(camera.distortion))
-            uv = pixels.reshape(-1, 2)
+            pixels, _ = cv2.projectPoints(
+                np.ascontiguousarray(rays), zero, zero, camera.matrix, np.array(camera.distortion)
+            )
+            u, v = np.nan_to_num(pixels.reshape(-1, 2).T, nan=-1.0)
         else:
-            uv = flat * (camera.fx, camera.fy) + (camera.cx, camera.cy)
-        uv = np.clip(np.nan_to_num(np.floor(uv + 0.5), nan=-1.0), -1, 1 << 20).astype(np.intp)
-        return uv[:, 0], uv[:, 1]
+            u, v = flat[0] * camera.fx + camera.cx, flat[1] * camera.fy + camera.cy
+        u = np.clip(np.floor(u + 0.5), -1, camera.width).astype(np.intp)
+        v = np.clip(np.floor(v + 0.5), -1, camera.height).astype(np.intp)
+        return u, v
 
 
 def seen_sectors(free: NDArray[np.bool_], cell: NDArray[np.intp], share: float) -> NDArray[np.bool_]:

@@ -16,7 +16,7 @@ GROUND_DEPTH_SHARE = 0.2
 the error is a share of the height; networks are wrong by 10 to 20 % (measured on rendered scenes)."""
 
 GROUND_SLOPE = 0.03
-"""Slope of the ground plus error of the attitude at capture, 1.7 degrees: an error that grows with distance."""
+"""Slope of the ground plus error of the attitude at capture, 1.7 degrees: it grows with distance."""
 
 _SMALLEST_HEIGHT_M = 0.6
 _LARGEST_HEIGHT_M = 60.0

@@ -21,7 +21,9 @@ _MANTISSA_SHIFT = 17
 """A positive float32 read as an integer grows like its logarithm; dropping 17 of its 23 mantissa bits
 leaves 64 bins an octave, each 1.1 to 1.6 % wide, at the cost of one shift."""
 
-_SECTORS_FROM_REAR_TO_FIRST = round((FIRST_BEARING_DEG + 180.0) / SECTOR_WIDTH_DEG)
+_ROWS_TO_FIRST_BEARING = round((FIRST_BEARING_DEG + 180.0) / SECTOR_WIDTH_DEG)
+"""Rows of the histogram start straight behind, elements at -155 degrees."""
+
 _PER_RADIAN = np.float32(np.degrees(1.0) / SECTOR_WIDTH_DEG)
 _REAR_OFFSET = np.float32(180.0 / SECTOR_WIDTH_DEG + 0.5)
 
@@ -31,9 +33,10 @@ class RangeHistogram:
 
     Args:
         max_distance_m: points at or beyond are not for this histogram.
+        capacity: most points that it is given between two calls of `clear`.
     """
 
-    def __init__(self, max_distance_m: float) -> None:
+    def __init__(self, max_distance_m: float, capacity: int) -> None:
         first, last = np.array([NEAREST_BIN_M, max_distance_m], np.float32).view(np.int32) >> _MANTISSA_SHIFT
         self._first_bin = np.int32(first)
         self._bins = int(last - first) + 1
@@ -42,12 +45,13 @@ class RangeHistogram:
         """(bins + 1,) float32 lower edges of the distance bins."""
         reach = np.searchsorted(self.edges_m[:-1], self.edges_m[:-1] * np.float32(SUPPORT_SPAN))
         self._window_end = np.minimum(reach, self._bins)
-        # One row more than directions: straight behind is reached from both sides.
-        self._counts = np.zeros((SECTOR_COUNT + 1) * self._bins + 1, dtype=np.int64)
+        # Written by `add`, counted at once by `nearest_m`; int64 because bincount would copy all else.
+        self._cells = np.zeros(capacity, dtype=np.int64)
+        self._used = 0
 
     def clear(self) -> None:
         """Forget every point."""
-        self._counts[:] = 0
+        self._used = 0
 
     def add(
         self,
@@ -56,7 +60,7 @@ class RangeHistogram:
         range_m: NDArray[np.float32],
         wanted: NDArray[np.bool_],
     ) -> None:
-        """Count points.
+        """Take in points.
 
         Args:
             forward_m, right_m: (N,) float32 horizontal coordinates in the level frame.
@@ -66,15 +70,16 @@ class RangeHistogram:
         direction = np.arctan2(right_m, forward_m)
         direction *= _PER_RADIAN
         direction += _REAR_OFFSET
-        key = np.maximum(range_m, np.float32(NEAREST_BIN_M)).view(np.int32)
-        key >>= _MANTISSA_SHIFT
-        key -= self._first_bin - 1  # cell 0 takes what is not wanted
         with np.errstate(invalid="ignore"):
-            row = direction.astype(np.int32)
-        row *= np.int32(self._bins)
-        key += row
-        key *= wanted
-        self._counts += np.bincount(key, minlength=self._counts.size)
+            cell = direction.astype(np.int32)
+        cell *= np.int32(self._bins)
+        octaves = np.maximum(range_m, np.float32(NEAREST_BIN_M)).view(np.int32)
+        octaves >>= _MANTISSA_SHIFT
+        cell += octaves
+        cell -= self._first_bin - 1  # cell 0 takes what is not wanted
+        end = self._used + len(cell)
+        np.multiply(cell, wanted, out=self._cells[self._used : end])
+        self._used = end
 
     def nearest_m(self, needed: NDArray[np.int64]) -> NDArray[np.float32]:
         """The nearest distance in each direction that has enough points within `SUPPORT_SPAN` of each other.
@@ -85,23 +90,24 @@ class RangeHistogram:
         Returns:
             (72,) float32 distance in metres, rounded down to a bin's edge; NaN where nothing is found.
         """
-        rows = self._counts[1:].reshape(SECTOR_COUNT + 1, self._bins)
-        counts = rows[:-1].copy()
-        counts[0] += rows[-1]
-        counts = np.roll(counts, -_SECTORS_FROM_REAR_TO_FIRST, axis=0)
-
         nearest = np.full(SECTOR_COUNT, np.nan, dtype=np.float32)
-        filled = np.flatnonzero(counts.sum(axis=1) >= needed.min())
-        if not filled.size:
-            return nearest
-        below = np.zeros((filled.size, self._bins + 1), dtype=np.int64)
-        np.cumsum(counts[filled], axis=1, out=below[:, 1:])
-        support = below[:, self._window_end] - below[:, :-1]
+        # One row more than directions: straight behind is reached from both sides.
+        size = (SECTOR_COUNT + 1) * self._bins + 1
+        counts = np.bincount(self._cells[: self._used], minlength=size)[1:size]
+        counts = counts.reshape(SECTOR_COUNT + 1, self._bins)
+        counts[0] += counts[-1]
+        rows = np.flatnonzero(counts[:-1].sum(axis=1) >= needed.min())
+
+        below = np.zeros((rows.size, self._bins + 1), dtype=np.int64)
+        np.cumsum(counts[rows], axis=1, out=below[:, 1:])
+        support = below.take(self._window_end, axis=1)
+        support -= below[:, :-1]
         enough = support >= needed
-        for row, sector in enumerate(filled):
-            if enough[row].any():
-                start = int(enough[row].argmax())
-                quantile = int(NEAR_QUANTILE * support[row, start])
-                rank = below[row, start] + max(int(needed[start]), quantile)
-                nearest[sector] = self.edges_m[np.searchsorted(below[row], rank) - 1]
+        starts = enough.argmax(axis=1)
+        for row in np.flatnonzero(enough.any(axis=1)):
+            start = starts[row]
+            quantile = int(NEAR_QUANTILE * support[row, start])
+            rank = below[row, start] + max(int(needed[start]), quantile)
+            distance = self.edges_m[np.searchsorted(below[row], rank) - 1]
+            nearest[(rows[row] - _ROWS_TO_FIRST_BEARING) % SECTOR_COUNT] = distance
         return nearest

@@ -98,7 +98,7 @@ class ObstacleScanner:
         self._rays = body_rays(camera, mount).reshape(3, -1)
         self._ground_rays = body_rays(camera, mount, _GROUND_STRIDE).reshape(3, -1)
         self._view = BandView(camera, mount, max_distance_m, below_m, above_m)
-        self._histogram = RangeHistogram(max_distance_m)
+        self._histogram = RangeHistogram(max_distance_m, camera.width * camera.height)
         self._needed = self._needed_pixels(min_pixels)
         self._bearings = sector_bearings_deg()
 
@@ -126,9 +126,7 @@ class ObstacleScanner:
             )
         if not (math.isfinite(attitude.roll_rad) and math.isfinite(attitude.pitch_rad)):
             raise ScanError(f"attitude is {attitude}: a finite roll and pitch are needed")
-        depth = np.array(depth_m, dtype=np.float32, order="C")
-        with np.errstate(invalid="ignore"):
-            depth[~(depth > 0)] = np.nan
+        depth = np.ascontiguousarray(depth_m, dtype=np.float32)
         level = attitude.level_from_body
         ground = self._ground(depth, level, height_m)
 
@@ -158,7 +156,7 @@ class ObstacleScanner:
         probe = self._view.probe(level)
         probed = depth[probe.pixel]
         points, range_m = self._level_points(self._rays[:, probe.pixel], probed, level)
-        free = ~np.isnan(probed) & ~self._is_obstacle(points[2], range_m, ground)
+        free = (probed > 0) & ~self._is_obstacle(points[2], range_m, ground)
         return seen_sectors(free, probe.cell, FREE_SHARE)
 
     def _level_points(
@@ -197,6 +195,7 @@ class ObstacleScanner:
             return LevelGround.below(height_m)
         start = _GROUND_STRIDE // 2
         sparse = depth[start::_GROUND_STRIDE, start::_GROUND_STRIDE].ravel()
+        sparse = np.where(sparse > 0, sparse, np.float32(np.nan))
         points, range_m = self._level_points(self._ground_rays, sparse, level)
         directions = level[2].astype(np.float32) @ self._ground_rays
         directions /= np.linalg.norm(self._ground_rays, axis=0)
@@ -214,11 +213,9 @@ class ObstacleScanner:
 
 
 def _without_speckles(depth: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Depth with single pixels that are nearer than all of their neighbours pushed back to the nearest one.
+    """Depth with unknown as +inf, and single pixels pushed back to the nearest of their neighbours.
 
     A line one pixel wide, such as a thin pole or a wire, stays: its pixels have each other.
     """
-    known = depth.copy()
-    known[np.isnan(known)] = np.inf
-    nearest_neighbour = cv2.erode(known, _NEIGHBOURS)
-    return np.asarray(np.maximum(depth, nearest_neighbour), dtype=np.float32)
+    known = np.where(depth > 0, depth, np.float32(np.inf))
+    return np.asarray(np.maximum(known, cv2.erode(known, _NEIGHBOURS)), dtype=np.float32)
