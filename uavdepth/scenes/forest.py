@@ -77,7 +77,7 @@ _WOODS = (
         0.1,
         (4.6, 6.2),
     ),
-    _Wood({"snowy_conifer": 0.75, "dead": 0.25}, ("snow", "snow", "needle_floor"), 0.0, (4.4, 6.2)),
+    _Wood({"snowy_conifer": 0.75, "dead": 0.25}, ("snow", "snow", "snow"), 0.0, (4.4, 6.2)),
 )
 _WOOD_SHARES = (0.22, 0.2, 0.17, 0.14, 0.17, 0.1)
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from uavdepth.scenes.copies import Template, add_copies
 from uavdepth.scenes.description import SceneDescription
@@ -20,7 +19,7 @@ from uavdepth.scenes.weather import draw_weather
 _CORE_M, _SPACING_M, _REACH_M = 156.0, 1.6, 1100.0
 _EXTENT_M = 145.0
 _CORRIDOR_HALF_WIDTH_M = 6.0
-_TREES, _BOULDERS, _BUSHES, _OUTCROPS = 330, 220, 60, 90
+_TREES, _BOULDERS, _BUSHES, _OUTCROPS = 330, 220, 60, 120
 _VARIETIES = 5
 """Templates of each kind of tree."""
 
@@ -69,7 +68,7 @@ class _Valley:
         away = 1.0 - np.exp(-((east / 18.0) ** 2))
         foot = self.cliff_north_m + 12.0 * away * self._wiggle.at(np.zeros_like(east), east)
         tall = self.cliff_height_m * (1.0 + away * 0.9 * self._wiggle.at(np.full_like(east, 500.0), east))
-        crumble = 1.6 * away * fractal_land(rng, north, east, 9.0, 3)
+        crumble = (0.5 + 1.7 * away) * fractal_land(rng, north, east, 9.0, 3)
         beyond = across - foot + crumble
         face = np.maximum(tall, 3.0) * smooth_step(beyond, 0.0, 5.0 + 0.12 * tall)
 
@@ -82,7 +81,7 @@ class _Valley:
         slope = self._steepness * (_eased(north_rise) + _eased(south_rise))
         mountain = slope * (0.35 + 0.9 * ridges)
         massif = (
-            smooth_step(north_rise + south_rise, 20.0, 160.0) * self._peak_m * ridges * (0.45 + 2.0 * far)
+            smooth_step(north_rise + south_rise, 20.0, 160.0) * self._peak_m * ridges * (0.45 + 0.9 * far)
         )
 
         corridor = np.exp(-((east / 12.0) ** 4)) * smooth_step(north, -14.0, -6.0)
@@ -164,7 +163,9 @@ def _add_land(
     texture[patches + 0.5 * fine > 0.55] = "soil"
     texture[steep_deg + 9.0 * patches + 5.0 * fine > 31.0] = "scree"
     texture[steep_deg + 7.0 * patches + 3.0 * fine > 42.0] = "rock"
-    snowy = (height + 14.0 * patches + 5.0 * fine > snow_line_m) & (steep_deg + 4.0 * fine < 46.0)
+    snowy = (height + 14.0 * patches + 5.0 * fine > snow_line_m) & (
+        steep_deg + 4.0 * fine < 46.0 + 12.0 * smooth_step(np.hypot(north, east), 150.0, 400.0)
+    )
     texture[snowy] = "snow"
     off = np.abs(north - valley.river_north_m(east)) - valley.river_half_m(east)
     texture[(off < 2.5 + 2.0 * patches) & (height < valley.water_m + 1.1)] = "gravel"
@@ -178,19 +179,6 @@ def _add_land(
         part = texture == name
         used, local = np.unique(faces[part], return_inverse=True)
         builder.add(vertices[used], local.reshape(-1, 3), uv[part], str(name), tint[part], smooth=True)
-
-
-def _add_outcrops(builder: MeshBuilder, rng: np.random.Generator, grid: TerrainGrid, valley: _Valley) -> None:
-    """Blocks that stand out of the northern face, which a grid of heights cannot show."""
-    for _ in range(_OUTCROPS):
-        east = rng.normal(0.0, 45.0)
-        north = valley.cliff_north_m + float(valley.bend_north_m(east)) + rng.uniform(1.0, 12.0)
-        if _steepness(grid, north, east) < 0.8:
-            continue
-        size = rng.uniform(2.0, 6.0)
-        behind = 0.25 * size
-        down = -float(grid.at(north, east)) + 0.35 * size
-        add_boulder(builder, rng, north + behind, east, down, size, sunk=0.1, tint=rng.uniform(0.85, 1.1))
 
 
 def _add_river(builder: MeshBuilder, valley: _Valley) -> None:
@@ -211,80 +199,95 @@ def _add_river(builder: MeshBuilder, valley: _Valley) -> None:
     builder.add(vertices, faces, vertices[:, :2], "water", (1.0, 1.0, 1.0), smooth=True)
 
 
-def _in_corridor(north_m: float, east_m: float, valley: _Valley, reach_m: float) -> bool:
-    """Whether something of this reach would stand at the take-off place or before the northern face."""
-    if math.hypot(north_m, east_m) < 8.0 + reach_m:
-        return True
-    return abs(east_m) < _CORRIDOR_HALF_WIDTH_M + reach_m and 0.0 < north_m < valley.cliff_north_m + 12.0
+def _keeps_corridor(places: NDArray[np.float64], valley: _Valley, reach_m: ArrayLike) -> NDArray[np.bool_]:
+    """(K,) True where a thing of that reach stands neither at the take-off place nor before the face."""
+    north, east = places[:, 0], places[:, 1]
+    reach = np.asarray(reach_m, float)
+    aside = np.abs(east) > _CORRIDOR_HALF_WIDTH_M + reach
+    outside = aside | (north < 0.0) | (north > valley.cliff_north_m + 12.0)
+    return np.asarray(outside & (np.hypot(north, east) > 8.0 + reach))
 
 
-def _steepness(grid: TerrainGrid, north_m: float, east_m: float) -> float:
-    """Rise over run of the ground around a place."""
-    span = 1.0
-    north = float(grid.at(north_m + span, east_m) - grid.at(north_m - span, east_m))
-    east = float(grid.at(north_m, east_m + span) - grid.at(north_m, east_m - span))
-    return math.hypot(north, east) / (2 * span)
+def _rise_over_run(grid: TerrainGrid, places: NDArray[np.float64]) -> Values:
+    """(K,) steepness of the ground around places."""
+    north, east = places[:, 0], places[:, 1]
+    along_north = grid.at(north + 1.0, east) - grid.at(north - 1.0, east)
+    along_east = grid.at(north, east + 1.0) - grid.at(north, east - 1.0)
+    return np.asarray(np.hypot(along_north, along_east) / 2.0)
+
+
+def _may_grow(
+    grid: TerrainGrid, valley: _Valley, places: NDArray[np.float64], reach_m: float
+) -> NDArray[np.bool_]:
+    """(K,) True on gentle dry ground off the corridor."""
+    off = np.abs(places[:, 0] - valley.river_north_m(places[:, 1]))
+    dry = off > valley.river_half_m(places[:, 1]) + 1.5
+    return dry & _keeps_corridor(places, valley, reach_m) & (_rise_over_run(grid, places) < 0.75)
+
+
+def _feet(grid: TerrainGrid, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(K, 3) NED points of the ground at places."""
+    return np.column_stack([places, -grid.at(places[:, 0], places[:, 1])])
+
+
+def _add_outcrops(builder: MeshBuilder, rng: np.random.Generator, grid: TerrainGrid, valley: _Valley) -> None:
+    """Blocks that stand out of the northern face, which a grid of heights cannot show."""
+    east = rng.normal(0.0, 45.0, _OUTCROPS)
+    north = valley.cliff_north_m + valley.bend_north_m(east) + rng.uniform(1.0, 12.0, _OUTCROPS)
+    places = np.column_stack([north, east])
+    places = places[_rise_over_run(grid, places) > 0.8]
+    for north_m, east_m, down_m in _feet(grid, places):
+        size = rng.uniform(2.0, 7.0)
+        down = down_m + 0.35 * size
+        add_boulder(
+            builder, rng, north_m + 0.22 * size, east_m, down, size, sunk=0.1, tint=rng.uniform(0.9, 1.1)
+        )
 
 
 def _add_boulders(builder: MeshBuilder, rng: np.random.Generator, grid: TerrainGrid, valley: _Valley) -> None:
-    for _ in range(_BOULDERS):
-        size = float(np.clip(rng.lognormal(0.1, 0.75), 0.5, 6.0))
-        east = rng.uniform(-150.0, 150.0)
-        place = rng.random()
-        if place < 0.35:
-            north = valley.cliff_north_m + float(valley.bend_north_m(east)) + rng.normal(-3.0, 6.0)
-        elif place < 0.6:
-            north = float(valley.river_north_m(east)) + rng.normal(0.0, 9.0)
-        else:
-            north = rng.uniform(-150.0, 150.0)
-        if _in_corridor(north, east, valley, size):
-            continue
-        add_boulder(builder, rng, north, east, -float(grid.at(north, east)), size, sunk=rng.uniform(0.2, 0.4))
+    """A third under the northern face, a quarter in and along the river, the rest anywhere."""
+    sizes = np.clip(rng.lognormal(0.1, 0.75, _BOULDERS), 0.5, 6.0)
+    east = rng.uniform(-150.0, 150.0, _BOULDERS)
+    under_face = valley.cliff_north_m + valley.bend_north_m(east) + rng.normal(-3.0, 6.0, _BOULDERS)
+    in_river = valley.river_north_m(east) + rng.normal(0.0, 9.0, _BOULDERS)
+    anywhere = rng.uniform(-150.0, 150.0, _BOULDERS)
+    choice = rng.random(_BOULDERS)
+    north = np.select([choice < 0.35, choice < 0.6], [under_face, in_river], anywhere)
+    places = np.column_stack([north, east])
+    for which in np.flatnonzero(_keeps_corridor(places, valley, sizes)):
+        (foot,) = _feet(grid, places[which : which + 1])
+        add_boulder(builder, rng, foot[0], foot[1], foot[2], float(sizes[which]), sunk=rng.uniform(0.2, 0.4))
 
 
 def _add_plants(
     builder: MeshBuilder, rng: np.random.Generator, grid: TerrainGrid, valley: _Valley, snow_line_m: float
 ) -> None:
-    groves = LandNoise(rng, 45.0)
     tree_line_m = rng.uniform(30.0, 60.0)
+    places = rng.uniform(-155.0, 155.0, (_TREES * 6, 2))
+    height = grid.at(places[:, 0], places[:, 1])
+    grove = LandNoise(rng, 45.0).at(places[:, 0], places[:, 1]) + rng.normal(0.0, 0.25, len(places))
+    grows = (grove > 0.1) & (height < tree_line_m + rng.normal(0.0, 8.0, len(places)))
+    grows &= _may_grow(grid, valley, places, reach_m=3.5)
+    chosen = np.flatnonzero(grows)[:_TREES]
+    feet = _feet(grid, places[chosen])
+
     broadleaf = 0.25 if rng.random() < 0.4 else 0.03
-    crowd: dict[TreeKind, list[tuple[float, float, float]]] = {}
-    planted = 0
-    for north, east in rng.uniform(-155.0, 155.0, (_TREES * 6, 2)):
-        if planted >= _TREES:
-            break
-        height = float(grid.at(north, east))
-        if groves.at(north, east) + rng.normal(0.0, 0.25) < 0.1 or height > tree_line_m + rng.normal(
-            0.0, 8.0
-        ):
-            continue
-        if not _may_grow(grid, valley, north, east, reach_m=3.5):
-            continue
-        kind: TreeKind = "conifer"
-        if height > snow_line_m + rng.normal(4.0, 5.0):
-            kind = "snowy_conifer"
-        elif rng.random() < broadleaf:
-            kind = "birch" if rng.random() < 0.5 else "broadleaf"
-        elif rng.random() < 0.03:
-            kind = "dead"
-        crowd.setdefault(kind, []).append((north, east, -height))
-        planted += 1
-    for kind, feet in crowd.items():
-        which = rng.integers(_VARIETIES, size=len(feet))
-        for number in range(_VARIETIES):
-            height = rng.uniform(7.0, 12.0)
-            make = partial(add_tree, rng=rng, north_m=0.0, east_m=0.0, ground_down_m=0.0, height_m=height)
-            template = Template.of(partial(make, kind=kind), height)
-            here = np.array(feet)[which == number]
-            add_copies(builder, rng, template, here, rng.uniform(4.0, 14.0, len(here)))
-    for north, east in rng.uniform(-130.0, 130.0, (_BUSHES, 2)):
-        height = float(grid.at(north, east))
-        if height < min(snow_line_m, tree_line_m) and _may_grow(grid, valley, north, east, reach_m=1.5):
-            add_bush(builder, rng, north, east, -height, rng.uniform(0.5, 2.0))
+    kinds: tuple[TreeKind, ...] = ("conifer", "snowy_conifer", "broadleaf", "birch", "dead")
+    luck = rng.random(len(feet))
+    snowy = -feet[:, 2] > snow_line_m + rng.normal(4.0, 5.0, len(feet))
+    species = np.select([snowy, luck < 0.5 * broadleaf, luck < broadleaf, luck > 0.97], [1, 2, 3, 4], 0)
+    variety = rng.integers(_VARIETIES, size=len(feet))
+    heights = rng.uniform(4.0, 14.0, len(feet))
+    for number in np.unique(species):
+        for which in range(_VARIETIES):
+            tall = rng.uniform(7.0, 12.0)
+            make = partial(add_tree, rng=rng, north_m=0.0, east_m=0.0, ground_down_m=0.0, height_m=tall)
+            here = (species == number) & (variety == which)
+            add_copies(
+                builder, rng, Template.of(partial(make, kind=kinds[number]), tall), feet[here], heights[here]
+            )
 
-
-def _may_grow(grid: TerrainGrid, valley: _Valley, north_m: float, east_m: float, reach_m: float) -> bool:
-    if _in_corridor(north_m, east_m, valley, reach_m) or _steepness(grid, north_m, east_m) > 0.75:
-        return False
-    off = abs(north_m - float(valley.river_north_m(east_m)))
-    return off > float(valley.river_half_m(east_m)) + 1.5
+    places = rng.uniform(-130.0, 130.0, (_BUSHES, 2))
+    feet = _feet(grid, places[_may_grow(grid, valley, places, reach_m=1.5)])
+    for foot in feet[-feet[:, 2] < min(snow_line_m, tree_line_m)]:
+        add_bush(builder, rng, foot[0], foot[1], foot[2], rng.uniform(0.5, 2.0))

@@ -103,7 +103,7 @@ def add_log(
     _add_tube(builder, line, radii, 7, "bark", shade)
     for end, radius in ((line[0], radii[0]), (line[-1], radii[-1])):
         cap, faces = lumpy_sphere(rng, 0, (0.97 * radius,) * 3, 0.1)
-        builder.add(cap + end, faces, box_uv(cap, faces), "bark", shade * [0.9, 1.2, 1.4])
+        builder.add(cap + end, faces, box_uv(cap, faces), "bark", shade * [0.9, 1.05, 1.15])
     for _ in range(int(rng.integers(2, 5))):
         start = line[int(rng.integers(1, 4))]
         tip = start + rng.normal(0.0, 0.5, 3) * [1.0, 1.0, 0.3] - [0.0, 0.0, rng.uniform(0.3, 1.2)]
@@ -164,10 +164,10 @@ def _leaf_ball(
     directions = rng.normal(0.0, 1.0, (shards, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     size = np.clip(0.3 * min(radii_m), 0.12, 0.5)
-    root = directions * np.array(radii_m) * rng.uniform(0.8, 1.0, (shards, 1))
+    root = directions * np.array(radii_m) * rng.uniform(0.5, 0.8, (shards, 1))
     across = np.cross(directions, rng.normal(0.0, 1.0, (shards, 3)))
     across *= size / np.linalg.norm(across, axis=1, keepdims=True)
-    tip = root + directions * size * rng.uniform(0.8, 1.8, (shards, 1))
+    tip = directions * (np.array(radii_m) + size * rng.uniform(0.3, 1.3, (shards, 1)))
     corners = np.stack([root - across, root + across, tip], axis=1).reshape(-1, 3) + centre
     triangles = np.arange(3 * shards).reshape(-1, 3)
     shade = rng.uniform(0.8, 1.2, (shards, 1))
