@@ -6,11 +6,16 @@ _DRIFT = 0.001
 """Seconds a second by which bounds are loosened: crystals part by 100e-6, ArduPilot's SITL by 200e-6."""
 
 _SLOW_CLOCK_DRIFT = 0.03
-"""The same for the upper bound while nothing reaches it: PX4's simulator ran 1.6 % slow for minutes."""
+"""The same for the upper bound while nothing reaches it and no round trip tells better: PX4's simulator
+ran 1.6 % slow for minutes."""
 
 _UNREACHED_NS = 1_000_000_000
 _LONGEST_GAP_NS = 250_000_000
 """A silent link loosens the bounds by no more than a gap of this length would."""
+
+_ANSWER_BIAS_NS = 15_000_000
+"""ArduPilot takes the time that a request needs at the port's baud off its stamp, on a network too: its
+answers put the offset up to 10 ms too high."""
 
 _STEP_NS = 100_000_000
 """Bounds that contradict each other by less are drift and noise; by more, a clock has stepped."""
@@ -55,7 +60,7 @@ class ClockSync:
         self._upper_ns: float | None = None
         self._lower_ns: float | None = None
         self._loosened_at_ns = 0
-        self._reached_at_ns = 0
+        self._unreached_ns = 0
         self._round_trip_at_ns: int | None = None
         self._late_since_ns: int | None = None
         self._late_least_ns = 0
@@ -80,22 +85,22 @@ class ClockSync:
     def is_synced(self, now_ns: int) -> bool:
         """Whether a recent round trip binds the clocks, so that stamps may be sent to the autopilot."""
         width_ns = self.width_ns
-        recent = self._round_trip_at_ns is not None and now_ns - self._round_trip_at_ns <= _SYNCED_FOR_NS
-        return recent and width_ns is not None and width_ns <= _MAX_WIDTH_NS
+        return self._has_round_trip(now_ns) and width_ns is not None and width_ns <= _MAX_WIDTH_NS
 
     def on_arrival(self, boot_ns: int, arrival_ns: int) -> bool:
         """Take a message stamped `boot_ns` by the autopilot; True if it shows that a clock has stepped."""
         self._loosen(arrival_ns)
         bound = arrival_ns - boot_ns
         if self._upper_ns is None:
-            self._tighten(bound, arrival_ns)
+            self._tighten(bound)
             return False
         if self._lower_ns is not None and bound < self._lower_ns - _STEP_NS:
             return self._step_to(bound, arrival_ns)
         if bound > self._upper_ns + _LATE_NS:
+            self._unreached_ns = 0
             return self._on_late(bound, arrival_ns)
         self._late_since_ns = None
-        self._tighten(bound, arrival_ns)
+        self._tighten(bound)
         return False
 
     def on_round_trip(self, sent_ns: int, boot_ns: int, received_ns: int) -> bool:
@@ -115,18 +120,22 @@ class ClockSync:
         if stepped:
             self._step_to(high, received_ns)
         self._round_trip_at_ns = received_ns
-        self._tighten(high, received_ns)
-        if self._upper_ns is not None and low > self._upper_ns:
-            self._upper_ns = high  # the autopilot's clock runs slow: the newest word is the true one
-        self._lower_ns = low if self._lower_ns is None else max(self._lower_ns, low)
+        self._tighten(high)
+        if self._upper_ns is None or low > self._upper_ns + _ANSWER_BIAS_NS:
+            self._reach(high)  # the autopilot's clock runs slow
+        upper_ns = high if self._upper_ns is None else self._upper_ns
+        self._lower_ns = min(upper_ns, low if self._lower_ns is None else max(self._lower_ns, low))
         return stepped
 
-    def _tighten(self, bound: float, at_ns: int) -> None:
+    def _tighten(self, bound: float) -> None:
         """The offset is no larger than `bound`."""
         if self._upper_ns is None or bound <= self._upper_ns:
-            self._upper_ns, self._reached_at_ns = bound, at_ns
-        if self._lower_ns is not None:
+            self._reach(bound)
+        if self._lower_ns is not None and self._upper_ns is not None:
             self._lower_ns = min(self._lower_ns, self._upper_ns)
+
+    def _reach(self, upper_ns: float) -> None:
+        self._upper_ns, self._unreached_ns = upper_ns, 0
 
     def _on_late(self, bound: int, arrival_ns: int) -> bool:
         """A queue that runs empty gets less late; lateness that stays is a clock that has stepped."""
@@ -141,15 +150,19 @@ class ClockSync:
     def _step_to(self, upper_ns: int, at_ns: int) -> bool:
         self._forget()
         self._loosened_at_ns = at_ns
-        self._tighten(upper_ns, at_ns)
+        self._tighten(upper_ns)
         self.steps += 1
         return True
 
     def _loosen(self, now_ns: int) -> None:
         gap_ns = min(max(0, now_ns - self._loosened_at_ns), _LONGEST_GAP_NS)
         self._loosened_at_ns = now_ns
+        self._unreached_ns += gap_ns
         if self._lower_ns is not None:
             self._lower_ns -= gap_ns * _DRIFT
         if self._upper_ns is not None:
-            unreached = now_ns - self._reached_at_ns > _UNREACHED_NS
-            self._upper_ns += gap_ns * (_SLOW_CLOCK_DRIFT if unreached else _DRIFT)
+            slow = self._unreached_ns > _UNREACHED_NS and not self._has_round_trip(now_ns)
+            self._upper_ns += gap_ns * (_SLOW_CLOCK_DRIFT if slow else _DRIFT)
+
+    def _has_round_trip(self, now_ns: int) -> bool:
+        return self._round_trip_at_ns is not None and now_ns - self._round_trip_at_ns <= _SYNCED_FOR_NS

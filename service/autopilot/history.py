@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from typing import Generic, TypeVar
 
 Value = TypeVar("Value")
@@ -21,11 +21,12 @@ class History(Generic[Value]):
         self._values: list[Value] = []
 
     def add(self, boot_ns: int, value: Value) -> None:
-        """Add the next value; one that is not newer than the newest is dropped."""
-        if self._times_ns and boot_ns <= self._times_ns[-1]:
+        """Add a value where its time belongs; a second one for the same time is dropped."""
+        i = bisect_left(self._times_ns, boot_ns)
+        if i < len(self._times_ns) and self._times_ns[i] == boot_ns:
             return
-        self._times_ns.append(boot_ns)
-        self._values.append(value)
+        self._times_ns.insert(i, boot_ns)
+        self._values.insert(i, value)
         if len(self._times_ns) >= 2 * self._capacity:
             del self._times_ns[: -self._capacity]
             del self._values[: -self._capacity]
