@@ -9,11 +9,9 @@ from typing import Protocol
 import numpy as np
 import structlog
 from numpy.typing import NDArray
-from uavdepth.ground_scale import GroundScale
 
 from service.errors import ConfigError
 from service.frame import Frame
-from service.scale_hold import ScaleHold, ScaleStatus
 from service.settings import Settings
 from service.telemetry import Telemetry
 from service.trouble import Trouble
@@ -21,7 +19,9 @@ from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel
 from uavdepth.depth_map import DepthMap
 from uavdepth.errors import ModelCardError, ModelFileError, UavDepthError
+from uavdepth.ground_scale import GroundScale
 from uavdepth.obstacle_scan import SECTOR_COUNT, ObstacleScan, SectorState, sector_bearings_deg
+from uavdepth.scale_tracker import ScaleTracker
 
 log = structlog.get_logger()
 
@@ -49,6 +49,21 @@ class Scanner(Protocol):
         self, depth_m: NDArray[np.float32], attitude: Attitude, height_m: float | None = None
     ) -> ObstacleScan:
         """The scan."""
+
+
+@dataclass(frozen=True)
+class ScaleStatus:
+    """The metric scale that a picture was measured with.
+
+    Args:
+        factor: network units to metres.
+        relative_sigma: its relative standard deviation.
+        age_s: time since the ground was seen, seconds; 0 if on this picture.
+    """
+
+    factor: float
+    relative_sigma: float
+    age_s: float
 
 
 @dataclass(frozen=True)
@@ -126,7 +141,8 @@ class Perception:
         self._scaler = scaler
         self._scanner = scanner
         self._model_max_depth_m = model_max_depth_m
-        self._scale_hold = ScaleHold(round(settings.scan.scale_hold_s * 1e9))
+        self._tracker = ScaleTracker(settings.scan.scale_hold_s)
+        self._ground_seen_ns = 0
         self._model_failures = 0
 
     @classmethod
@@ -206,7 +222,7 @@ class Perception:
         estimate = None
         if telemetry.height_m is not None:
             estimate = self._scaler.estimate(seen, telemetry.attitude, telemetry.height_m)
-        scale = self._scale_hold.update(estimate, blank.captured_ns)
+        scale = self._tracked(estimate, blank.captured_ns)
         if scale is None:
             missing = Trouble.NO_HEIGHT if telemetry.height_m is None else Trouble.NO_GROUND
             return replace(blank, trouble=missing)
@@ -220,6 +236,16 @@ class Perception:
             # ArduPilot reads "unknown everywhere" as healthy and free (measured): silence is the only no.
             return result.distrusted(Trouble.NO_DEPTH)
         return result
+
+    def _tracked(self, estimate: GroundScale | None, captured_ns: int) -> ScaleStatus | None:
+        """The scale to use for this picture, its ground's or one that is held."""
+        if estimate is not None:
+            self._ground_seen_ns = captured_ns
+        scale = self._tracker.update(estimate, captured_ns)
+        if scale is None:
+            return None
+        age_s = (captured_ns - self._ground_seen_ns) / 1e9
+        return ScaleStatus(scale.factor, scale.relative_sigma, age_s)
 
     def _certain(self, depth: DepthMap) -> NDArray[np.float32]:
         """Depth with the pixels that the network is not sure of taken out."""

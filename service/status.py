@@ -11,8 +11,8 @@ import numpy as np
 from service.autopilot.link_status import LinkStatus
 from service.autopilot.service_state import ServiceState
 from service.cameras.reader import CameraStatus
+from service.pipeline import ScaleStatus
 from service.publisher.publisher import PublisherStatus
-from service.scale_hold import ScaleStatus
 from service.trouble import Trouble
 
 _MIB = 1024 * 1024

@@ -1,0 +1,179 @@
+"""The perception step: depth in the network's units becomes trusted metres, or silence with a reason."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from program_fakes import FLYING_HEIGHT_M, LEVEL, FixedDepth, make_settings, picture, wall_over_ground
+from service.frame import Frame
+from service.pipeline import Perception, unknown_scan
+from service.telemetry import Telemetry
+from service.trouble import Trouble
+from uavdepth.errors import ImageSizeError
+from uavdepth.ground_scale import GroundScaler
+from uavdepth.obstacle_scan import SectorState
+from uavdepth.scanner import ObstacleScanner
+
+SETTINGS = make_settings()
+CAMERA = SETTINGS.camera.model
+MOUNT = SETTINGS.mount.mount
+AHEAD = 31
+"""Element of OBSTACLE_DISTANCE that looks along the nose: -155 + 31 * 5 = 0."""
+
+FLYING = Telemetry(0, LEVEL, FLYING_HEIGHT_M)
+
+
+def perception_of(model: FixedDepth, *overrides: str, model_max_depth_m: float = float("inf")) -> Perception:
+    settings = make_settings(*overrides)
+    scanner = ObstacleScanner(CAMERA, MOUNT)
+    return Perception(settings, model, GroundScaler(CAMERA, MOUNT), scanner, model_max_depth_m)
+
+
+def frame_at(seconds: float, index: int = 0) -> Frame:
+    return Frame(picture(), round(seconds * 1e9), index)
+
+
+def shrunk(depth_m: NDArray[np.float32], factor: float = 0.25) -> NDArray[np.float32]:
+    """Depth as a network gives it that does not know metres."""
+    return depth_m * np.float32(factor)
+
+
+def test_a_wall_is_reported_in_metres_though_the_network_knows_none() -> None:
+    perception = perception_of(FixedDepth(shrunk(wall_over_ground(CAMERA, 8.0))))
+    result = perception.step(frame_at(1.0), replace(FLYING, at_ns=1_000_000_000))
+    assert result.trouble is None
+    assert result.trusted
+    assert result.scale is not None
+    assert result.scale.factor == pytest.approx(4.0, rel=0.03)
+    assert result.scan.state[AHEAD] == SectorState.OBSTACLE
+    assert result.scan.distance_m[AHEAD] == pytest.approx(8.0, rel=0.05)
+    assert result.depth is not None
+    assert result.depth.depth_m[CAMERA.height // 2, CAMERA.width // 2] == pytest.approx(8.0, rel=0.03)
+
+
+def test_the_vehicles_state_is_asked_for_at_the_time_of_capture_after_the_network_has_run() -> None:
+    model = FixedDepth(shrunk(wall_over_ground(CAMERA, 8.0)))
+    asked: list[tuple[int, int]] = []
+
+    def telemetry_at(captured_ns: int) -> Telemetry:
+        asked.append((captured_ns, model.asked))
+        return replace(FLYING, at_ns=captured_ns)
+
+    assert perception_of(model).step_late(frame_at(3.0), telemetry_at).trusted
+    assert asked == [(3_000_000_000, 1)]
+
+
+@pytest.mark.parametrize(
+    ("telemetry", "depth_m", "trouble"),
+    [
+        (replace(FLYING, attitude=None), wall_over_ground(CAMERA, 8.0), Trouble.NO_ATTITUDE),
+        (replace(FLYING, height_m=None), wall_over_ground(CAMERA, 8.0), Trouble.NO_HEIGHT),
+        (replace(FLYING, height_m=float("nan")), wall_over_ground(CAMERA, 8.0), Trouble.NO_GROUND),
+        (FLYING, np.full((CAMERA.height, CAMERA.width), 0.4, np.float32), Trouble.NO_GROUND),
+        (FLYING, np.full((CAMERA.height, CAMERA.width), np.nan, np.float32), Trouble.NO_DEPTH),
+        (FLYING, np.full((CAMERA.height, CAMERA.width), np.inf, np.float32), Trouble.NO_DEPTH),
+    ],
+)
+def test_doubt_silences_every_element_and_says_why(
+    telemetry: Telemetry, depth_m: NDArray[np.float32], trouble: Trouble
+) -> None:
+    result = perception_of(FixedDepth(depth_m)).step(frame_at(0.0), telemetry)
+    assert result.trouble is trouble
+    assert not result.trusted
+    assert np.all(result.scan.state == SectorState.UNKNOWN)
+    assert np.all(np.isnan(result.scan.distance_m))
+
+
+def test_a_scale_is_held_for_a_while_without_height_and_then_given_up() -> None:
+    perception = perception_of(FixedDepth(shrunk(wall_over_ground(CAMERA, 8.0))), "scan.scale_hold_s=1.0")
+    assert perception.step(frame_at(10.0), FLYING).trusted
+    blind = replace(FLYING, height_m=None)
+    held = perception.step(frame_at(10.9), blind)
+    assert held.trusted
+    assert held.scale is not None
+    assert held.scale.age_s == pytest.approx(0.9)
+    assert held.scan.distance_m[AHEAD] == pytest.approx(8.0, rel=0.05)
+    assert perception.step(frame_at(11.1), blind).trouble is Trouble.NO_HEIGHT
+
+
+def test_an_uncertain_scale_is_not_used() -> None:
+    perception = perception_of(
+        FixedDepth(shrunk(wall_over_ground(CAMERA, 8.0))), "scan.max_scale_sigma=0.001"
+    )
+    result = perception.step(frame_at(0.0), FLYING)
+    assert result.trouble is Trouble.BAD_SCALE
+    assert np.all(result.scan.state == SectorState.UNKNOWN)
+
+
+@pytest.mark.parametrize("error", [RuntimeError("provider broke"), ImageSizeError("160x96"), KeyError("x")])
+def test_a_network_that_fails_is_counted_and_the_next_picture_goes_on(error: Exception) -> None:
+    model = FixedDepth(shrunk(wall_over_ground(CAMERA, 8.0)), error=error)
+    perception = perception_of(model)
+    result = perception.step(frame_at(0.0), FLYING)
+    assert result.trouble is Trouble.MODEL_FAILED
+    assert result.detail
+    assert perception.model_failures == 1
+    model.error = None
+    assert perception.step(frame_at(0.1), FLYING).trusted
+    assert perception.model_failures == 1
+
+
+def test_pixels_that_the_network_is_not_sure_of_are_unknown() -> None:
+    depth_m = shrunk(wall_over_ground(CAMERA, 8.0))
+    sigma = np.zeros_like(depth_m)
+    sigma[:, : CAMERA.width // 2] = 3.0
+    sigma[:, CAMERA.width // 2 : CAMERA.width // 2 + 4] = np.nan
+    result = perception_of(FixedDepth(depth_m, sigma)).step(frame_at(0.0), FLYING)
+    assert result.trusted
+    assert np.all(result.scan.state[:AHEAD] == SectorState.UNKNOWN)
+    assert np.any(result.scan.state[AHEAD + 1 :] == SectorState.OBSTACLE)
+    assert result.depth is not None
+    assert np.all(np.isnan(result.depth.depth_m[:, : CAMERA.width // 2 + 4]))
+
+
+def test_the_far_end_of_the_network_never_stands_there_as_a_wall() -> None:
+    # The network saturates at 3 of its units, which the ground says are 12 m: sky would be a wall there.
+    depth_m = np.minimum(shrunk(wall_over_ground(CAMERA, np.inf)), np.float32(3.0))
+    result = perception_of(FixedDepth(depth_m), model_max_depth_m=3.0).step(frame_at(0.0), FLYING)
+    assert not np.any(result.scan.state == SectorState.OBSTACLE)
+    # Without the knowledge of the end the same depth is a wall: this is what the rule prevents.
+    believed = perception_of(FixedDepth(depth_m)).step(frame_at(0.0), FLYING)
+    assert np.any(believed.scan.state == SectorState.OBSTACLE)
+
+
+def test_a_far_end_beyond_the_scan_is_clear() -> None:
+    depth_m = np.minimum(shrunk(wall_over_ground(CAMERA, np.inf)), np.float32(20.0))
+    result = perception_of(FixedDepth(depth_m), model_max_depth_m=20.0).step(frame_at(0.0), FLYING)
+    assert result.scan.state[AHEAD] == SectorState.CLEAR
+
+
+def test_a_result_that_came_too_late_is_taken_back() -> None:
+    result = perception_of(FixedDepth(shrunk(wall_over_ground(CAMERA, 8.0)))).step(frame_at(0.0), FLYING)
+    assert np.any(result.scan.state != SectorState.UNKNOWN)
+    late = result.distrusted(Trouble.STALE_FRAME)
+    assert not late.trusted
+    assert np.all(late.scan.state == SectorState.UNKNOWN)
+    assert late.scan.max_distance_m == result.scan.max_distance_m
+
+
+def test_live_and_replay_agree() -> None:
+    results = []
+    for _ in range(2):
+        perception = perception_of(FixedDepth(shrunk(wall_over_ground(CAMERA, 8.0))))
+        results.append([perception.step(frame_at(0.1 * i, i), FLYING).scan.distance_m for i in range(5)])
+    np.testing.assert_array_equal(results[0], results[1])
+
+
+def test_an_unknown_scan_has_all_elements_and_no_distance() -> None:
+    scan = unknown_scan(0.2, 20.0)
+    assert scan.state.shape == scan.distance_m.shape == scan.bearing_deg.shape == (72,)
+    assert scan.nearest_m is None
+
+
+@pytest.mark.parametrize("trouble", list(Trouble))
+def test_every_trouble_fits_into_one_status_text(trouble: Trouble) -> None:
+    assert len(f"uavdepth OFF: {trouble.value}") <= 50
