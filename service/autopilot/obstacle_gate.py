@@ -41,9 +41,9 @@ class ObstacleGate:
         return None
 
     def passed(self, captured_ns: int, now_ns: int) -> None:
-        """A scan was sent. Up to half a period is made up for: a camera's own rhythm keeps the mean."""
+        """A scan was sent. Up to a period is made up for, so that a camera's own rhythm keeps the mean."""
         self._newest_captured_ns = captured_ns
-        earliest_ns = now_ns - self._period_ns // 2
+        earliest_ns = now_ns - self._period_ns
         self._due_ns = self._period_ns + (
             earliest_ns if self._due_ns is None else max(self._due_ns, earliest_ns)
         )

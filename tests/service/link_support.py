@@ -80,7 +80,7 @@ class TrueOffset:
 
 
 def dataflash_rows(name: str, *types: str) -> dict[str, NDArray[np.float64]]:
-    """Rows of a dataflash log by type: (N, 4) time in microseconds since boot, roll, pitch, yaw in degrees."""
+    """(N, 4) rows of a dataflash log by type: microseconds since boot; roll, pitch, yaw in degrees."""
     log = DFReader.DFReader_binary(str(LOGS / name))
     rows: dict[str, list[tuple[float, ...]]] = {kind: [] for kind in types}
     while (row := log.recv_match(type=list(types))) is not None:

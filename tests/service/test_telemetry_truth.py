@@ -1,4 +1,4 @@
-"""Telemetry at capture time, held against what the simulator knew (flight C: S-turns, climbs, hard sticks)."""
+"""Telemetry at capture time, held against what the simulator knew (flight C: S-turns, climbs)."""
 
 from __future__ import annotations
 
