@@ -75,7 +75,7 @@ class TestPoles:
         assert scan.distance_m[element(0)] == pytest.approx(5.9, rel=0.03)
 
     def test_distance_is_horizontal_not_depth_and_not_slant(self, camera, mount, level):
-        # Square panels at 10 m whose axis distance is not their z-depth (40 degrees to the side).
+        # 40 degrees to the side z-depth is 23 % short of the distance.
         depth = depth_of([pole(40, 10.0, 0.3)], camera, mount, level)
         scan = ObstacleScanner(camera, mount).scan(depth, level)
         assert scan.distance_m[element(40)] == pytest.approx(9.7, rel=0.02)
@@ -154,6 +154,11 @@ class TestGround:
             scan = ObstacleScanner(camera, mount).scan(depth_of([wall(4)], camera, mount, attitude), attitude)
             assert element(0) in obstacles(scan)
             assert scan.distance_m[element(0)] == pytest.approx(4.0, rel=0.03)
+
+    def test_a_beam_across_the_way_is_not_taken_for_ground(self, camera, mount, level):
+        beam = box((4, -10, 1.0), (4.1, 10, 1.15))
+        scan = ObstacleScanner(camera, mount).scan(depth_of([beam], camera, mount, level), level)
+        assert scan.distance_m[element(0)] == pytest.approx(4.0, rel=0.03)
 
     @pytest.mark.parametrize("height", [math.nan, math.inf, 0.0, -3.0])
     def test_an_impossible_height_is_as_good_as_none(self, camera, mount, level, height):
@@ -264,6 +269,17 @@ class TestNoise:
             nearest.append(scanner.scan(depth, level, 5.0).nearest_m)
         assert max(nearest) / min(nearest) < 1.1
         assert 0.75 * 8 < min(nearest) <= max(nearest) < 1.05 * 8
+
+    def test_noise_on_a_wall_does_not_bring_it_much_nearer(self, camera, mount, level):
+        depth = depth_of([wall(8)], camera, mount, level)
+        depth *= np.random.default_rng(8).normal(1.0, 0.05, depth.shape).astype(np.float32)
+        scan = ObstacleScanner(camera, mount).scan(depth, level)
+        assert 0.87 * 8 < scan.distance_m[element(0)] <= 8
+
+    def test_a_speck_the_size_of_a_fingernail_is_no_obstacle(self, camera, mount, level):
+        depth = np.full((320, 640), np.inf, np.float32)
+        depth[100:105, 320:325] = 1.0
+        assert obstacles(ObstacleScanner(camera, mount).scan(depth, level)) == []
 
 
 class TestMounting:
