@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import settings
 
 from uavdepth import Attitude, CameraModel, CameraMount
+
+# The same examples every time, and no time limit: tests run on loaded machines too.
+settings.register_profile("steady", derandomize=True, deadline=None)
+settings.load_profile("steady")
 
 
 @pytest.fixture(scope="session")
