@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.demo.radar import BACKGROUND_BGR, TEXT_BGR, draw_radar
-from uavdepth.depth_codec import colorize_depth
+from uavdepth.depth_colors import colorize_depth
 from uavdepth.obstacle_scan import ObstacleScan
 
 PANEL_HEIGHT_PX = 360
@@ -37,7 +37,9 @@ def draw_side_by_side(
     """
     panels = [
         _panel(image_bgr, "camera"),
-        _panel(colorize_depth(depth_m, near_m, far_m), f"depth, lighter = nearer ({near_m:g} to {far_m:g} m)"),
+        _panel(
+            colorize_depth(depth_m, near_m, far_m), f"depth, lighter = nearer ({near_m:g} to {far_m:g} m)"
+        ),
         _panel(draw_radar(scan, PANEL_HEIGHT_PX), "scan, nose up"),
     ]
     return _join(panels)

@@ -41,7 +41,9 @@ def draw_radar(scan: ObstacleScan | None, size_px: int, ring_step_m: float = 5.0
         _label(picture, "no data", (centre[0], centre[1]), 1.2)
         return _shrink(picture, size_px)
     for bearing, distance, state in zip(scan.bearing_deg, scan.distance_m, scan.state, strict=True):
-        _draw_sector(picture, centre, radius, float(bearing), float(distance), int(state), scan.max_distance_m)
+        _draw_sector(
+            picture, centre, radius, float(bearing), float(distance), int(state), scan.max_distance_m
+        )
     _hatch_unknown(picture)
     for ring_m in np.arange(ring_step_m, scan.max_distance_m + 0.1, ring_step_m):
         ring_px = int(radius * ring_m / scan.max_distance_m)
@@ -60,9 +62,8 @@ def _draw_sector(
     centre: tuple[int, int],
     radius: int,
     bearing_deg: float,
-    distance_m: float,
+    reach: float,
     state: int,
-    max_distance_m: float,
 ) -> None:
     # OpenCV measures ellipse angles clockwise from the picture's x axis; the nose points up.
     start = bearing_deg - SECTOR_WIDTH_DEG / 2 - 90
@@ -71,7 +72,7 @@ def _draw_sector(
     if state == SectorState.CLEAR:
         cv2.ellipse(picture, centre, axes, 0, start, end, CLEAR_BGR, -1, cv2.LINE_AA)
     elif state == SectorState.OBSTACLE:
-        inner = int(radius * min(distance_m / max_distance_m, 1.0))
+        inner = int(radius * min(reach, 1.0))
         cv2.ellipse(picture, centre, axes, 0, start, end, OBSTACLE_BGR, -1, cv2.LINE_AA)
         cv2.ellipse(picture, centre, (inner, inner), 0, start, end, CLEAR_BGR, -1, cv2.LINE_AA)
     else:
