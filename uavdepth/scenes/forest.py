@@ -12,6 +12,7 @@ from uavdepth.scenes.copies import Template, add_copies
 from uavdepth.scenes.description import SceneDescription
 from uavdepth.scenes.mesh import MeshBuilder
 from uavdepth.scenes.rocks import add_boulder
+from uavdepth.scenes.shapes import box_uv, grid_faces
 from uavdepth.scenes.terrain import LandNoise, Values, fractal_land, stretched_axis
 from uavdepth.scenes.vegetation import (
     TreeKind,
@@ -86,7 +87,7 @@ def build(seed: int) -> SceneDescription:
     """The forest of one seed."""
     rng = np.random.default_rng([seed, 0xF0E])
     wood = _WOODS[int(rng.choice(len(_WOODS), p=_WOOD_SHARES))]
-    wall_north_m = rng.uniform(33.0, 39.0)
+    wall_north_m = rng.uniform(34.0, 39.0)
     builder = MeshBuilder()
     _add_floor(builder, rng, wood)
     _add_trees(builder, rng, wood, wall_north_m)
@@ -128,10 +129,7 @@ def _add_floor(builder: MeshBuilder, rng: np.random.Generator, wood: _Wood) -> N
     # Corners off the grid's lines hide the grid where one texture meets another.
     shake = (np.hypot(north, east) < _EXTENT_M + 10.0) * rng.uniform(-0.28, 0.28, (2, *north.shape))
     vertices = np.stack([north + shake[0], east + shake[1], np.zeros_like(north)], axis=-1).reshape(-1, 3)
-    rows = len(lines)
-    corner = (np.arange(rows - 1)[:, None] * rows + np.arange(rows - 1)[None, :]).ravel()
-    up, right, both = corner + rows, corner + 1, corner + rows + 1
-    faces = np.concatenate([np.stack([corner, both, up], axis=1), np.stack([corner, right, both], axis=1)])
+    faces = grid_faces(len(lines), len(lines))
     middle = vertices[faces].mean(axis=1)
     patches = fractal_land(rng, middle[:, 0], middle[:, 1], 14.0, 3)
     low, middling, high = wood.floors
@@ -163,7 +161,7 @@ def _is_free(places: NDArray[np.float64], reach_m: ArrayLike, wall_north_m: floa
     clear = np.hypot(north, east) > _CLEARING_M + reach
     before = (north > -2.0) & (north < wall_north_m + 1.0)
     corridor = before & (east < _CORRIDOR_HALF_WIDTH_M + reach)
-    wall = (north > wall_north_m - 3.0) & (north < wall_north_m + 9.0) & (east < _WALL_HALF_WIDTH_M + 3.0)
+    wall = (north > wall_north_m - 3.0) & (north < wall_north_m + 13.0) & (east < _WALL_HALF_WIDTH_M + 3.0)
     return np.asarray(clear & ~corridor & ~wall)
 
 
@@ -195,16 +193,16 @@ def _tree_template(rng: np.random.Generator, kind: TreeKind, height_m: float, au
 
 
 def _add_tree_wall(builder: MeshBuilder, rng: np.random.Generator, wood: _Wood, north_m: float) -> None:
-    """A stand too dense to fly through: two staggered ranks of young trees, bushes between their feet."""
+    """A stand too dense to fly through: bushes, a rank of young conifers, three ranks of tall ones."""
     kind: TreeKind = "snowy_conifer" if "snowy_conifer" in wood.kinds else "conifer"
-    for rank in range(3):
-        east = np.arange(-_WALL_HALF_WIDTH_M, _WALL_HALF_WIDTH_M + 0.1, 1.7) + 0.85 * (rank % 2)
-        north = north_m + 1.7 * rank + rng.uniform(-0.4, 0.4, len(east))
-        places = np.column_stack([north, east + rng.uniform(-0.3, 0.3, len(east))])
-        heights = rng.uniform(10.5, 15.0, len(east))
+    for rank, (low_m, high_m) in enumerate(((4.5, 7.5), (10.5, 15.0), (10.5, 15.0), (11.0, 16.0))):
+        east = np.arange(-_WALL_HALF_WIDTH_M, _WALL_HALF_WIDTH_M + 0.1, 1.5) + 0.75 * (rank % 2)
+        north = north_m + 1.6 * rank + rng.uniform(-0.4, 0.4, len(east))
+        places = np.column_stack([north, east + rng.uniform(-0.2, 0.2, len(east))])
+        heights = rng.uniform(low_m, high_m, len(east))
         which = rng.integers(3, size=len(east))
         for number in range(3):
-            template = _tree_template(rng, kind, 11.0, 0.0)
+            template = _tree_template(rng, kind, 0.5 * (low_m + high_m), 0.0)
             add_copies(builder, rng, template, _on_ground(places[which == number]), heights[which == number])
     for east_m in np.arange(-_WALL_HALF_WIDTH_M, _WALL_HALF_WIDTH_M + 0.1, 1.1):
         place = north_m - 0.4 + rng.uniform(-0.3, 0.5)
@@ -212,11 +210,24 @@ def _add_tree_wall(builder: MeshBuilder, rng: np.random.Generator, wood: _Wood, 
 
 
 def _add_rock_bank(builder: MeshBuilder, rng: np.random.Generator, north_m: float) -> None:
-    """A wall of piled rocks about 10 m high."""
+    """A rocky rise about 10 m high, steep towards the origin, with rocks piled before it."""
+    profile = np.array(
+        [(1.6, -0.3), (2.0, 2.5), (2.6, 5.0), (3.2, 7.5), (4.2, 9.8), (7.0, 10.4), (10.0, 6.5), (13.0, -0.3)]
+    )
+    east = np.linspace(-_WALL_HALF_WIDTH_M - 4.0, _WALL_HALF_WIDTH_M + 4.0, 27)
+    ends = np.clip((_WALL_HALF_WIDTH_M + 4.5 - np.abs(east)) / 5.0, 0.1, 1.0)
+    vertices = np.empty((len(profile), len(east), 3))
+    vertices[..., 0] = north_m + profile[:, None, 0]
+    vertices[..., 1] = east
+    vertices[..., 2] = -profile[:, None, 1] * ends
+    vertices[1:-1] += rng.uniform(-0.45, 0.45, vertices[1:-1].shape)
+    faces = grid_faces(len(profile), len(east))
+    flat = vertices.reshape(-1, 3)
     tint = rng.uniform(0.8, 1.2)
+    builder.add(flat, faces, box_uv(flat, faces), "rock", np.full(3, tint))
     for level, spacing in enumerate((2.6, 2.8, 3.2)):
         for east_m in np.arange(-_WALL_HALF_WIDTH_M, _WALL_HALF_WIDTH_M + 0.1, spacing):
-            size = rng.uniform(5.0, 6.5)
+            size = rng.uniform(3.5, 6.0)
             place = north_m + 0.4 * size + 0.9 * level + rng.uniform(-0.4, 0.4)
             add_boulder(builder, rng, place, east_m, -3.1 * level, size, sunk=0.2, tint=tint)
 
@@ -229,9 +240,9 @@ def _add_undergrowth(
         plant = partial(add_bush, rng=rng, north_m=0.0, east_m=0.0, ground_down_m=0.0, height_m=height)
         bush = Template.of(partial(plant, autumn=wood.autumn), height)
         places = rng.uniform(-_PLANTED_M, _PLANTED_M, (int(rng.integers(12, 40)), 2))
-        places = places[_is_free(places, 1.2, wall_north_m)]
         heights = np.clip(rng.lognormal(0.0, 0.4, len(places)), 0.4, 2.6)
-        add_copies(builder, rng, bush, _on_ground(places), heights)
+        free = _is_free(places, bush.reach * heights, wall_north_m)
+        add_copies(builder, rng, bush, _on_ground(places[free]), heights[free])
     if "snow" not in wood.floors:
         for _ in range(4):
             blades = str(rng.choice(["grass", "leaves"]))

@@ -10,8 +10,6 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from uavdepth.scenes.description import SceneDescription
-
 STEP_S = 0.5
 """Time between the control points of a flight's splines."""
 MIN_SPEED_MPS, MAX_SPEED_MPS = 1.0, 8.0
@@ -37,11 +35,18 @@ _AROUND = np.array(
 _HEADINGS = np.arange(24) * (2 * math.pi / 24)
 
 
+class Extent(Protocol):
+    """How far a scene goes."""
+
+    @property
+    def extent_m(self) -> float: ...
+
+
 class World(Protocol):
     """What the planner asks a scene."""
 
     @property
-    def description(self) -> SceneDescription: ...
+    def description(self) -> Extent: ...
     def ground_height_m(self, north_m: float, east_m: float) -> float: ...
     def ray_distance_m(self, origin_ned_m: ArrayLike, direction_ned: ArrayLike) -> NDArray[np.floating]: ...
     def clearance_m(self, position_ned_m: Sequence[float]) -> float: ...

@@ -100,6 +100,15 @@ def tube(centres_m: ArrayLike, radii_m: ArrayLike, sides: int) -> tuple[Shape, N
     return (vertices.reshape(-1, 3), faces.astype(np.int32)), uv.reshape(-1, 2)
 
 
+def grid_faces(rows: int, columns: int) -> NDArray[np.int32]:
+    """(M, 3) faces of a grid of vertices numbered row by row: two triangles a cell, sharing the diagonal from
+    its first corner; they face up where rows go north and columns east."""
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)[None, :]).ravel()
+    up, right, both = corner + columns, corner + 1, corner + columns + 1
+    faces = np.concatenate([np.stack([corner, both, up], axis=1), np.stack([corner, right, both], axis=1)])
+    return faces.astype(np.int32)
+
+
 def box_uv(vertices_m: ArrayLike, faces: ArrayLike) -> NDArray[np.float64]:
     """(M, 3, 2) texture coordinates in metres, each face projected along the axis that it faces most."""
     vertices = np.asarray(vertices_m, float)

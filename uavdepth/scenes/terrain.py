@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from uavdepth.scenes.shapes import grid_faces
+
 Values = NDArray[np.float64]
 
 _TABLE = 64
@@ -108,13 +110,7 @@ class TerrainGrid:
         """(N, 3) NED vertices and (M, 3) faces, wound to face up."""
         north, east = np.meshgrid(self.north_m, self.east_m, indexing="ij")
         vertices = np.stack([north, east, -self.height_m], axis=-1).reshape(-1, 3)
-        rows, columns = self.height_m.shape
-        corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)[None, :]).ravel()
-        up, right, both = corner + columns, corner + 1, corner + columns + 1
-        faces = np.concatenate(
-            [np.stack([corner, both, up], axis=1), np.stack([corner, right, both], axis=1)]
-        )
-        return vertices, faces.astype(np.int32)
+        return vertices, grid_faces(*self.height_m.shape)
 
 
 def stretched_axis(core_m: float, spacing_m: float, reach_m: float, growth: float = 1.16) -> Values:
