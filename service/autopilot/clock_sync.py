@@ -23,6 +23,9 @@ _STEP_NS = 100_000_000
 _MAX_WIDTH_NS = 50_000_000
 """Widest bracket whose middle is taken: beyond it the way up is too slow to say anything."""
 
+_SYNCED_WIDTH_NS = 15_000_000
+"""Widest bracket that counts as synchronised: its middle is at most 7.5 ms off, a degree at 130 deg/s."""
+
 _MAX_ROUND_TRIP_NS = 1_000_000_000
 """Slower round trips are not looked at."""
 
@@ -83,9 +86,9 @@ class ClockSync:
         return max(0, round(self._upper_ns - self._lower_ns))
 
     def is_synced(self, now_ns: int) -> bool:
-        """Whether a recent round trip binds the clocks, so that stamps may be sent to the autopilot."""
+        """Whether a recent round trip binds the clocks closely enough to send stamps to the autopilot."""
         width_ns = self.width_ns
-        return self._has_round_trip(now_ns) and width_ns is not None and width_ns <= _MAX_WIDTH_NS
+        return self._has_round_trip(now_ns) and width_ns is not None and width_ns <= _SYNCED_WIDTH_NS
 
     def on_arrival(self, boot_ns: int, arrival_ns: int) -> bool:
         """Take a message stamped `boot_ns` by the autopilot; True if it shows that a clock has stepped."""
@@ -143,9 +146,13 @@ class ClockSync:
             self._late_since_ns, self._late_least_ns = arrival_ns, bound
             return False
         self._late_least_ns = min(self._late_least_ns, bound)
-        if arrival_ns - self._late_since_ns < _STEADY_FOR_NS or self.is_synced(arrival_ns):
+        if arrival_ns - self._late_since_ns < _STEADY_FOR_NS or self._denies_steps(arrival_ns):
             return False  # too early to tell, or a round trip has said lately that the old offset holds
         return self._step_to(self._late_least_ns, arrival_ns)
+
+    def _denies_steps(self, now_ns: int) -> bool:
+        width_ns = self.width_ns
+        return self._has_round_trip(now_ns) and width_ns is not None and width_ns <= _MAX_WIDTH_NS
 
     def _step_to(self, upper_ns: int, at_ns: int) -> bool:
         self._forget()

@@ -72,11 +72,14 @@ class TrueOffset:
 
     def host_ns(self, boot_ns: float) -> int:
         """The host's time at a moment of the autopilot's clock."""
-        return (
-            round(boot_ns)
-            + int(self._least_ns)
-            + round(float(np.interp(boot_ns, self._boot_ns, self._offset_ns)))
-        )
+        return round(boot_ns) + self._at(boot_ns)
+
+    def boot_ns(self, host_ns: int) -> int:
+        """The autopilot's time at a moment of the host's clock."""
+        return host_ns - self._at(host_ns - int(self._least_ns))
+
+    def _at(self, boot_ns: float) -> int:
+        return int(self._least_ns) + round(float(np.interp(boot_ns, self._boot_ns, self._offset_ns)))
 
 
 def dataflash_rows(name: str, *types: str) -> dict[str, NDArray[np.float64]]:
@@ -94,6 +97,7 @@ class Conversation:
     def __init__(self, start_ns: int, **settings: object) -> None:
         self.session = LinkSession(AutopilotSettings.model_validate(settings))
         self.now_ns = start_ns
+        self._next_tick_ns = start_ns + TICK_NS
         self.sent: list[tuple[int, mavlink.MAVLink_message]] = []
         self.notices: list[str] = []
         self.session.line_opened(start_ns)
@@ -106,8 +110,9 @@ class Conversation:
 
     def wait_until(self, at_ns: int) -> None:
         """Let time pass."""
-        while self.now_ns + TICK_NS <= at_ns:
-            self.now_ns += TICK_NS
+        while self._next_tick_ns <= at_ns:
+            self.now_ns = self._next_tick_ns
+            self._next_tick_ns += TICK_NS
             self._tick()
         self.now_ns = max(self.now_ns, at_ns)
 

@@ -100,9 +100,9 @@ def test_a_stall_of_a_minute_does_not_make_old_messages_fresh() -> None:
 
 def test_round_trips_bracket_the_offset() -> None:
     sync = ClockSync()
-    now_ns = arrivals(sync, 7 * S, [20 * MS] * 100)
+    now_ns = arrivals(sync, 7 * S, [5 * MS] * 100)
     assert not sync.is_synced(now_ns)
-    sync.on_round_trip(now_ns, now_ns + 20 * MS - 7 * S, now_ns + 40 * MS)
+    sync.on_round_trip(now_ns, now_ns + 5 * MS - 7 * S, now_ns + 10 * MS)
     assert sync.offset_ns == pytest.approx(7 * S, abs=1 * MS)
     assert sync.is_synced(now_ns + 1 * S)
     assert not sync.is_synced(now_ns + 11 * S)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from link_support import SECOND_NS, Arrival, Conversation, TrueOffset, dataflash_rows, read_tlog
+from link_support import SECOND_NS, Arrival, Conversation, TrueOffset, Voice, dataflash_rows, read_tlog
 from numpy.typing import NDArray
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 LATENCY_NS = 80_000_000
 """A frame is looked up this long after its exposure, when the network is done with it."""
@@ -34,24 +36,24 @@ def wrapped(degrees: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def looked_up(
-    flight: Recorded, arrivals: list[Arrival], latency_ns: int, extra_ns: int = 0
+    flight: Recorded, talk: Conversation, arrivals: Iterable[Arrival], latency_ns: int
 ) -> NDArray[np.float64]:
-    """(N, 4) row number and the attitude that the link gives for the moment of each SIM row, in degrees.
+    """(N, 5) row number, the attitude that the link gives for the moment of each SIM row in degrees, and
+    whether it called the clocks synchronised.
 
-    Frames are exposed at the SIM rows and looked up `latency_ns` later, while the recorded bytes arrive.
+    Frames are exposed at the SIM rows and looked up `latency_ns` later, while the bytes arrive.
     """
-    talk = Conversation(arrivals[0].at_ns)
-    first_ns, last_ns = arrivals[0].at_ns + 2 * SECOND_NS, arrivals[-1].at_ns - SECOND_NS
-    captures = [
-        (flight.offset.host_ns(row[0] * 1000) + extra_ns, k) for k, row in enumerate(flight.truth_deg)
-    ]
+    recorded = flight.arrivals
+    first_ns, last_ns = recorded[0].at_ns + 2 * SECOND_NS, recorded[-1].at_ns - SECOND_NS
+    captures = [(flight.offset.host_ns(row[0] * 1000), k) for k, row in enumerate(flight.truth_deg)]
     captures = [(at_ns, k) for at_ns, k in captures if first_ns < at_ns < last_ns]
     found, i = [], 0
     for arrival in arrivals:
         while i < len(captures) and captures[i][0] + latency_ns <= arrival.at_ns:
             attitude = talk.session.telemetry_at(captures[i][0], arrival.at_ns).attitude
             angles = (attitude.roll_rad, attitude.pitch_rad, attitude.yaw_rad) if attitude else (np.nan,) * 3
-            found.append((captures[i][1], *np.degrees(angles)))
+            synced = talk.session.status(arrival.at_ns).clock_synced
+            found.append((captures[i][1], *np.degrees(angles), synced))
             i += 1
         talk.hear(arrival.data, arrival.at_ns)
     return np.array(found)
@@ -72,11 +74,11 @@ def errors_deg(
         ],
         axis=1,
     )
-    return wrapped(found[:, 1:] - truth[:, 1:]), wrapped(found[:, 1:] - estimate)
+    return wrapped(found[:, 1:4] - truth[:, 1:]), wrapped(found[:, 1:4] - estimate)
 
 
 def test_attitude_at_capture_time_is_the_true_one(flight: Recorded) -> None:
-    found = looked_up(flight, flight.arrivals, LATENCY_NS)
+    found = looked_up(flight, Conversation(flight.arrivals[0].at_ns), flight.arrivals, LATENCY_NS)
     assert len(found) > 1800
     assert not np.isnan(found).any(), "an attitude is known for every frame of the flight"
     against_truth, against_autopilot = errors_deg(flight, found)
@@ -86,14 +88,63 @@ def test_attitude_at_capture_time_is_the_true_one(flight: Recorded) -> None:
     assert np.abs(against_autopilot).max() < 1.0
 
 
-def test_jitter_of_100_ms_costs_less_than_a_degree(flight: Recorded) -> None:
+def test_jitter_of_100_ms_on_datagrams_costs_less_than_a_degree(flight: Recorded) -> None:
     rng = np.random.default_rng(7)
     late = [Arrival(a.at_ns + int(rng.integers(0, 100_000_000)), a.data) for a in flight.arrivals]
-    found = looked_up(flight, sorted(late, key=lambda a: a.at_ns), LATENCY_NS + 100_000_000)
+    late.sort(key=lambda arrival: arrival.at_ns)
+    found = looked_up(flight, Conversation(late[0].at_ns), late, LATENCY_NS + 100_000_000)
     against_truth, against_autopilot = errors_deg(flight, found[~np.isnan(found[:, 1])])
     assert np.isnan(found[:, 1]).mean() < 0.01
     assert np.abs(against_truth[:, :2]).max() < 1.0
     assert np.abs(against_autopilot).max() < 1.0
+
+
+class AnsweringFlight:
+    """The recorded flight over a line that delays and keeps the order (TCP), both ways, while the autopilot
+    answers our TIMESYNC requests. `talk` hears each arrival before the next is made."""
+
+    def __init__(self, flight: Recorded, jitter_ns: int) -> None:
+        self._flight, self._jitter_ns, self._rng = flight, jitter_ns, np.random.default_rng(3)
+        self._voice, self._answered = Voice(), 0
+        self.talk = Conversation(flight.arrivals[0].at_ns)
+
+    def arrivals(self) -> Iterator[Arrival]:
+        line: list[Arrival] = []
+        newest_ns = 0
+        for recorded in self._flight.arrivals:
+            line.append(Arrival(recorded.at_ns + self._delay_ns(), recorded.data))
+            line += self._answers()
+            line.sort(key=lambda arrival: arrival.at_ns)
+            while line and line[0].at_ns <= recorded.at_ns:
+                newest_ns = max(newest_ns, line[0].at_ns)
+                yield Arrival(newest_ns, line.pop(0).data)
+
+    def _answers(self) -> list[Arrival]:
+        requests = [m for _, m in self.talk.sent_of("TIMESYNC") if m.tc1 == 0][self._answered :]
+        self._answered += len(requests)
+        answers = []
+        for request in requests:
+            there_ns = request.ts1 + self._delay_ns()
+            message = mavlink.MAVLink_timesync_message(self._flight.offset.boot_ns(there_ns), request.ts1)
+            answers.append(Arrival(there_ns + self._delay_ns(), self._voice.pack(message)))
+        return answers
+
+    def _delay_ns(self) -> int:
+        return int(self._rng.integers(0, self._jitter_ns))
+
+
+@pytest.mark.parametrize(("jitter_ms", "synced_share"), [(8, 0.95), (100, 0.2)])
+def test_jitter_on_a_line_that_keeps_the_order_costs_less_than_a_degree(
+    flight: Recorded, jitter_ms: int, synced_share: float
+) -> None:
+    """Such a line holds up every message; only round trips tell that from a clock that is off."""
+    late = AnsweringFlight(flight, jitter_ms * 1_000_000)
+    found = looked_up(flight, late.talk, late.arrivals(), LATENCY_NS + jitter_ms * 1_000_000)
+    against_truth, against_autopilot = errors_deg(flight, found)
+    assert not np.isnan(found).any()
+    assert np.abs(against_truth[:, :2]).max() < 1.0
+    assert np.abs(against_autopilot).max() < 1.0
+    assert found[:, 4].mean() > synced_share
 
 
 @pytest.mark.parametrize("step_ns", [SECOND_NS, -SECOND_NS])
