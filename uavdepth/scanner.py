@@ -31,8 +31,12 @@ FREE_SHARE = 0.7
 itself is then always among what is seen: of the default band it lies at 43 % from the top."""
 
 _GROUND_STRIDE = 4
-_CHUNK_PIXELS = 32768
-"""Pixels worked on at a time, so that the intermediate arrays stay in the processor's cache."""
+_ROWS_WORKED_ON = 160
+"""Rows are joined in groups, the nearest pixel of each group standing for it, until about so many are
+left: nothing near is lost, and the time of a scan does not grow with the picture's height."""
+
+_CHUNK = 32768
+"""Points worked on at a time, so that the intermediate arrays stay in the processor's cache."""
 
 _NEIGHBOURS = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], dtype=np.uint8)
 
@@ -43,6 +47,8 @@ class ObstacleScanner:
     Points are turned level by roll and pitch (not yaw: bearings stay with the nose), measured from
     the vehicle's origin, and sorted into elements of 5 degrees by their bearing. A point is an
     obstacle when it lies in the height band and is not ground.
+
+    A scanner keeps working memory: use one for each thread.
 
     An element is
     - OBSTACLE where enough points support a distance (see `RangeHistogram.nearest_m`), even at the
@@ -95,11 +101,16 @@ class ObstacleScanner:
         self.max_distance_m = float(max_distance_m)
         self.below_m = float(below_m)
         self.above_m = float(above_m)
-        self._rays = body_rays(camera, mount).reshape(3, -1)
+        self._together = max(1, round(camera.height / _ROWS_WORKED_ON))
+        rays = body_rays(camera, mount)
+        self._rays = rays.reshape(3, -1)
+        self._joined_rays = _mean_of_rows(rays, self._together).reshape(3, -1)
         self._ground_rays = body_rays(camera, mount, _GROUND_STRIDE).reshape(3, -1)
         self._view = BandView(camera, mount, max_distance_m, below_m, above_m)
-        self._histogram = RangeHistogram(max_distance_m, camera.width * camera.height)
+        self._histogram = RangeHistogram(max_distance_m, self._joined_rays.shape[1])
         self._needed = self._needed_pixels(min_pixels)
+        self._known = np.empty((camera.height, camera.width), dtype=np.float32)
+        self._neighbours = np.empty_like(self._known)
         self._bearings = sector_bearings_deg()
 
     def scan(
@@ -130,20 +141,32 @@ class ObstacleScanner:
         level = attitude.level_from_body
         ground = self._ground(depth, level, height_m)
 
-        distance = self._nearest(_without_speckles(depth).ravel(), level, ground)
+        joined = _nearest_of_rows(self._without_speckles(depth), self._together)
+        distance = self._nearest(joined.ravel(), level, ground)
         clear = self._seen_free(depth.ravel(), level, ground)
         state = np.where(clear, SectorState.CLEAR, SectorState.UNKNOWN).astype(np.uint8)
         state[~np.isnan(distance)] = SectorState.OBSTACLE
         return ObstacleScan(distance, state, self._bearings, self.min_distance_m, self.max_distance_m)
+
+    def _without_speckles(self, depth: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Depth with unknown as +inf, and single pixels pushed back to the nearest of their neighbours.
+
+        A line one pixel wide, such as a thin pole or a wire, stays: its pixels have each other.
+        """
+        known, neighbours = self._known, self._neighbours
+        known.fill(np.inf)
+        np.copyto(known, depth, where=depth > 0)
+        cv2.erode(known, _NEIGHBOURS, dst=neighbours)
+        return np.maximum(known, neighbours, out=known)
 
     def _nearest(
         self, depth: NDArray[np.float32], level: NDArray[np.float64], ground: LevelGround | None
     ) -> NDArray[np.float32]:
         """(72,) distance of the nearest obstacle, NaN for none, from every pixel."""
         self._histogram.clear()
-        for start in range(0, depth.size, _CHUNK_PIXELS):
-            chunk = slice(start, start + _CHUNK_PIXELS)
-            points, range_m = self._level_points(self._rays[:, chunk], depth[chunk], level)
+        for start in range(0, depth.size, _CHUNK):
+            chunk = slice(start, start + _CHUNK)
+            points, range_m = self._level_points(self._joined_rays[:, chunk], depth[chunk], level)
             obstacle = self._is_obstacle(points[2], range_m, ground)
             if obstacle.any():
                 self._histogram.add(points[0], points[1], range_m, obstacle)
@@ -202,20 +225,28 @@ class ObstacleScanner:
         return find_level_ground(points[2], range_m, directions)
 
     def _needed_pixels(self, min_pixels: int | None) -> NDArray[np.int64]:
-        """(bins,) pixels that make an obstacle at each distance of the histogram."""
+        """(bins,) joined pixels that make an obstacle at each distance of the histogram."""
         pixels_at_1m = self.camera.fx * self.camera.fy
         if min_pixels is None:
             min_pixels = max(6, round(pixels_at_1m * (SMALLEST_SIZE_M / self.max_distance_m) ** 2))
         element = self.camera.fx * math.radians(SECTOR_WIDTH_DEG) * self.camera.height
         shown = pixels_at_1m * SMALLEST_AREA_M2 / np.square(self._histogram.edges_m[:-1].astype(np.float64))
         most = max(min_pixels, int(LARGEST_SHARE * element))
-        return np.clip(shown, min_pixels, most).astype(np.int64)
+        return np.ceil(np.clip(shown, min_pixels, most) / self._together).astype(np.int64)
 
 
-def _without_speckles(depth: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Depth with unknown as +inf, and single pixels pushed back to the nearest of their neighbours.
+def _nearest_of_rows(depth: NDArray[np.float32], together: int) -> NDArray[np.float32]:
+    """(ceil(H / together), W) smallest depth of each group of rows."""
+    nearest = depth[::together].copy()
+    for row in range(1, together):
+        part = depth[row::together]
+        np.minimum(nearest[: len(part)], part, out=nearest[: len(part)])
+    return nearest
 
-    A line one pixel wide, such as a thin pole or a wire, stays: its pixels have each other.
-    """
-    known = np.where(depth > 0, depth, np.float32(np.inf))
-    return np.asarray(np.maximum(known, cv2.erode(known, _NEIGHBOURS)), dtype=np.float32)
+
+def _mean_of_rows(rays: NDArray[np.float32], together: int) -> NDArray[np.float32]:
+    """(3, ceil(H / together), W) mean direction of each group of rows of (3, H, W)."""
+    groups = np.arange(0, rays.shape[1], together)
+    sizes = np.diff(np.append(groups, rays.shape[1]))
+    total = np.add.reduceat(rays.astype(np.float64), groups, axis=1)
+    return np.ascontiguousarray(total / sizes[:, None], dtype=np.float32)
