@@ -33,7 +33,8 @@ class Vitals:
         frame_ns: when the newest picture arrived, None before the first.
         result_ns: when the newest picture was measured, None before the first.
         result_trouble: what was wrong with that one.
-        sent_ns: when obstacles were sent last, None if never.
+        sent_ns: when distances were sent last, None if never.
+        armed_ns: when the vehicle was armed last, None if it was so from the start or never.
     """
 
     now_ns: int
@@ -45,6 +46,12 @@ class Vitals:
     result_ns: int | None
     result_trouble: Trouble | None
     sent_ns: int | None
+    armed_ns: int | None = None
+
+    @property
+    def protected(self) -> bool:
+        """Whether the vehicle is armed and has been given distances since it was."""
+        return bool(self.armed) and self.sent_ns is not None and self.sent_ns >= (self.armed_ns or 0)
 
 
 def trouble_of(vitals: Vitals) -> Trouble | None:
@@ -72,7 +79,7 @@ def state_of(trouble: Trouble | None, vitals: Vitals) -> ServiceState:
         return ServiceState.ACTIVE
     if trouble is Trouble.STARTING:
         return ServiceState.BOOT
-    if trouble.is_fault or (vitals.sent_ns is not None and vitals.armed):
+    if trouble.is_fault or vitals.protected:
         return ServiceState.CRITICAL
     return ServiceState.STANDBY
 
@@ -107,5 +114,7 @@ class Announcer:
         self._said = trouble
         if trouble is None:
             return Announcement(SEVERITY_INFO, "uavdepth: obstacles ON")
+        if trouble is Trouble.ON_GROUND:
+            return Announcement(SEVERITY_INFO, "uavdepth ready: distances after take-off")
         severity = SEVERITY_CRITICAL if state is ServiceState.CRITICAL else SEVERITY_WARNING
         return Announcement(severity, f"uavdepth OFF: {trouble.value}")

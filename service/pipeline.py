@@ -152,9 +152,8 @@ class Perception:
         Raises:
             ConfigError: a network that is missing, has no card or cannot be run.
         """
-        from uavdepth.ground_scale import GroundScaler
-
         from uavdepth.depth_model import DepthModel
+        from uavdepth.ground_scale import GroundScaler
         from uavdepth.scanner import ObstacleScanner
 
         camera, mount, scan = settings.camera.model, settings.mount.mount, settings.scan

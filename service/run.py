@@ -105,6 +105,8 @@ class Service:
         self._last_result: PerceptionResult | None = None
         self._result_ns: int | None = None
         self._sent_ns: int | None = None
+        self._was_armed: bool | None = None
+        self._armed_ns: int | None = None
         self._started_ns = self._clock.now_ns()
         self._state = ServiceState.BOOT
         self._trouble: Trouble | None = Trouble.STARTING
@@ -127,6 +129,7 @@ class Service:
         self._started_ns = self._clock.now_ns()
         try:
             self._link.start()
+            self._link.set_state(ServiceState.BOOT)
             self._reader.start()
             if self._publisher is not None:
                 self._publisher.start()
@@ -231,6 +234,10 @@ class Service:
         begun_ns = self._clock.now_ns()
         result = perception.step_late(frame, self._link.telemetry_at)
         done_ns = self._clock.now_ns()
+        if self._stands_ready(result):
+            # "Unknown everywhere": ArduPilot refuses to arm before it has heard a proximity sensor.
+            result = result.distrusted(Trouble.ON_GROUND)
+            self._link.send_obstacles(result.scan, frame.captured_ns)
         max_age_ns = round(self._settings.autopilot.max_frame_age_s * 1e9)
         if result.trusted and done_ns - frame.captured_ns > max_age_ns:
             result = result.distrusted(Trouble.STALE_FRAME)
@@ -250,6 +257,16 @@ class Service:
         self._last_result = result
         self._result_ns = done_ns
         self._hand_out(result)
+
+    def _stands_ready(self, result: PerceptionResult) -> bool:
+        """Whether all is well but the vehicle stands: disarmed, and too low to tell the scale.
+
+        In the air, and where no rangefinder is heard, the same lack is a reason for silence.
+        """
+        if result.trouble not in (Trouble.NO_HEIGHT, Trouble.NO_GROUND):
+            return False
+        rangefinder_hz = self._link.status().rates_hz.get("DISTANCE_SENSOR", 0.0)
+        return result.telemetry.armed is False and rangefinder_hz > 0
 
     def _hand_out(self, result: PerceptionResult) -> None:
         if self._publisher is not None:
@@ -287,6 +304,7 @@ class Service:
             result_ns=self._result_ns,
             result_trouble=None if result is None else result.trouble,
             sent_ns=self._sent_ns,
+            armed_ns=self._note_arming(link.armed),
         )
         self._trouble = trouble_of(vitals)
         self._state = state_of(self._trouble, vitals)
@@ -295,6 +313,14 @@ class Service:
         if words is not None:
             self._link.say(words.severity, words.text)
             log.info(words.text, state=self._state.name, detail=_detail(result, camera.detail, link))
+
+    def _note_arming(self, armed: bool | None) -> int | None:
+        """When the vehicle was armed last; `armed` is what it is now."""
+        if armed and self._was_armed is False:
+            self._armed_ns = self._clock.now_ns()
+        if armed is not None:
+            self._was_armed = armed
+        return self._armed_ns
 
 
 def _detail(result: PerceptionResult | None, camera_detail: str, link: LinkStatus) -> str:

@@ -9,6 +9,8 @@ class Trouble(Enum):
     """Why depth cannot be trusted. The values are read by pilots, as STATUSTEXT of 50 characters at most."""
 
     STARTING = "starting"
+    ON_GROUND = "on the ground"
+    """Disarmed, with a rangefinder: too low for a scale, and nothing is wrong."""
     CAMERA_LOST = "no pictures from the camera"
     STALE_FRAME = "pictures are too old"
     STALLED = "depth computation stalled"

@@ -107,6 +107,7 @@ class FakeLink:
     attitude: Attitude | None = LEVEL
     height_m: float | None = FLYING_HEIGHT_M
     position_ned_m: tuple[float, float, float] | None = (0.0, 0.0, -FLYING_HEIGHT_M)
+    rangefinder_hz: float = 20.0
     takes_obstacles: bool = True
     sent: list[tuple[ObstacleScan, int]] = field(default_factory=list)
     states: list[ServiceState] = field(default_factory=list)
@@ -140,6 +141,7 @@ class FakeLink:
             connected=self.connected,
             armed=self.armed,
             system_id=1,
+            rates_hz={"DISTANCE_SENSOR": self.rangefinder_hz},
             autopilot="ardupilot",
             sent_obstacles=len(self.sent),
         )

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
-
 from program_fakes import ScriptedCamera, make_settings, picture, wait_until
+
 from service.cameras.camera import CameraEndedError, PictureSizeError
 from service.cameras.reader import CameraReader, CameraState
 from service.clock import MonotonicClock

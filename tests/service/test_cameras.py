@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-
 from program_fakes import HEIGHT, WIDTH, FakeLink, free_port, make_settings, picture
+
 from service.cameras.camera import (
     CameraEndedError,
     CameraTimeoutError,
@@ -26,7 +26,6 @@ from service.cameras.rendered import RenderedCamera
 from service.cameras.rtsp import RtspCamera, without_password
 from service.cameras.source import make_camera, open_camera
 from service.cameras.usb import UsbCamera
-from service.cameras.video_file import VideoFileCamera
 from service.clock import ManualClock, MonotonicClock
 from service.errors import CameraError, ConfigError
 from service.settings import Settings

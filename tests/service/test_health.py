@@ -61,6 +61,16 @@ def judged(vitals: Vitals) -> tuple[Trouble | None, ServiceState]:
             ServiceState.STANDBY,
         ),
         (replace(NEVER_SENT, result_trouble=Trouble.NO_HEIGHT), Trouble.NO_HEIGHT, ServiceState.STANDBY),
+        (
+            replace(SILENT, result_trouble=Trouble.NO_HEIGHT, armed_ns=NOW - 1_000_000),
+            Trouble.NO_HEIGHT,
+            ServiceState.STANDBY,  # armed again since: it has not left the ground yet
+        ),
+        (
+            replace(NEVER_SENT, result_trouble=Trouble.ON_GROUND, armed=False),
+            Trouble.ON_GROUND,
+            ServiceState.STANDBY,
+        ),
         (SILENT, Trouble.NOT_SENT, ServiceState.CRITICAL),
         (replace(NEVER_SENT, result_ns=None), Trouble.STARTING, ServiceState.BOOT),
         (replace(NEVER_SENT, link_connected=False), Trouble.STARTING, ServiceState.BOOT),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 
 from program_fakes import wait_until
+
 from service.latest_slot import LatestSlot
 
 

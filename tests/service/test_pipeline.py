@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-
 from program_fakes import FLYING_HEIGHT_M, LEVEL, FixedDepth, make_settings, picture, wall_over_ground
+
 from service.frame import Frame
 from service.pipeline import Perception, unknown_scan
 from service.telemetry import Telemetry

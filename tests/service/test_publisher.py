@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import zenoh
-
 from program_fakes import free_port, make_settings, picture, wait_until, wall_over_ground
+
 from service.clock import ManualClock, MonotonicClock
 from service.errors import PublisherError
 from service.frame import Frame

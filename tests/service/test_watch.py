@@ -6,9 +6,9 @@ import json
 
 import numpy as np
 import pytest
+from program_fakes import free_port, wait_until
 from rich.console import Console
 
-from program_fakes import free_port, wait_until
 from service.clock import MonotonicClock
 from service.publisher.session import open_session
 from service.publisher.wire import ScanSample, StatusSample
