@@ -117,9 +117,10 @@ def _line(truth: Truth) -> str:
     north, east, down = truth.position_ned_m
     nearest = "-" if truth.nearest_m is None else f"{truth.nearest_m:.2f} m"
     states = [truth.mode, "armed" if truth.armed else "disarmed", *(["COLLIDED"] if truth.collided else [])]
+    obstacles = f"{truth.obstacle_messages} obstacle messages, {truth.obstacle_rate_hz:.1f} Hz"
     return (
         f"{truth.time_s:7.1f} s  {' '.join(states):<24} north {north:7.2f}  east {east:7.2f}  "
-        f"height {-down:6.2f} m  nearest {nearest:>8}  obstacle messages {truth.obstacle_messages} ({truth.obstacle_rate_hz:.1f} Hz)"
+        f"height {-down:6.2f} m  nearest {nearest:>8}  {obstacles}"
     )
 
 

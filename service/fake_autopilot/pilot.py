@@ -18,25 +18,20 @@ from service.errors import LinkError
 from service.fake_autopilot.ardupilot import ArduPilot
 from service.fake_autopilot.parameters import ARDUPILOT_DEFAULTS, PX4_DEFAULTS
 from service.fake_autopilot.px4 import Px4
+from service.fake_autopilot.stick_messages import (
+    TARGET_COMPONENT,
+    body_velocity,
+    manual_control,
+    rc_override,
+)
 from uavdepth.errors import UavDepthError
 
 STATION_SYSTEM, STATION_COMPONENT = 255, 190
-TARGET_COMPONENT = 1
 HEARTBEAT_S = 1.0
 REPEAT_S = 0.1
 ACK_TIMEOUT_S = 2.0
 TRY_AGAIN_S = 0.5
 RECEIVE_BYTES = 65536
-VELOCITY_MASK = (
-    mavlink.POSITION_TARGET_TYPEMASK_X_IGNORE
-    | mavlink.POSITION_TARGET_TYPEMASK_Y_IGNORE
-    | mavlink.POSITION_TARGET_TYPEMASK_Z_IGNORE
-    | mavlink.POSITION_TARGET_TYPEMASK_AX_IGNORE
-    | mavlink.POSITION_TARGET_TYPEMASK_AY_IGNORE
-    | mavlink.POSITION_TARGET_TYPEMASK_AZ_IGNORE
-    | mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
-)
-LOITER_DEAD_ZONE_US, LOITER_TRAVEL_US, RC_MIDDLE_US = 30, 470, 1500
 
 
 class PilotError(UavDepthError):
@@ -168,24 +163,24 @@ class Pilot:
         """
         if self.is_px4:
             share = _share(speed_mps, PX4_DEFAULTS["MPC_VEL_MANUAL"])
-            self._steady = lambda: [self._manual_control(share)]
+            self._steady = lambda: [manual_control(self._system_id, share)]
             self.set_mode("POSCTL")
         elif guided:
-            self._steady = lambda: [self._velocity(speed_mps)]
+            self._steady = lambda: [body_velocity(self._system_id, speed_mps)]
             self.set_mode("GUIDED")
         else:
             share = _share(speed_mps, ARDUPILOT_DEFAULTS["LOIT_SPEED_MS"])
-            self._steady = lambda: [self._rc_override(share)]
+            self._steady = lambda: [rc_override(self._system_id, share)]
             self.set_mode("LOITER")
 
     def hover(self) -> None:
         """Centre the sticks and ask for no speed, in the mode that it is in."""
         if self.is_px4:
-            self._steady = lambda: [self._manual_control(0.0)]
+            self._steady = lambda: [manual_control(self._system_id, 0.0)]
         elif self.mode == "GUIDED":
-            self._steady = lambda: [self._velocity(0.0)]
+            self._steady = lambda: [body_velocity(self._system_id, 0.0)]
         else:
-            self._steady = lambda: [self._rc_override(0.0)]
+            self._steady = lambda: [rc_override(self._system_id, 0.0)]
 
     def land(self) -> None:
         """Land here and disarm.
@@ -214,36 +209,6 @@ class Pilot:
     @property
     def _modes(self) -> Mapping[str, int]:
         return Px4.modes if self.is_px4 else ArduPilot.modes
-
-    def _manual_control(self, forward: float) -> Any:
-        return mavlink.MAVLink_manual_control_message(self._system_id, round(forward * 1000), 0, 500, 0, 0)
-
-    def _rc_override(self, forward: float) -> Any:
-        pitch = RC_MIDDLE_US
-        if forward != 0.0:
-            travel = math.copysign(LOITER_DEAD_ZONE_US + abs(forward) * LOITER_TRAVEL_US, forward)
-            pitch = round(RC_MIDDLE_US - travel)
-        middle = RC_MIDDLE_US
-        return mavlink.MAVLink_rc_channels_override_message(
-            self._system_id, TARGET_COMPONENT, middle, pitch, middle, middle, 0, 0, 0, 0
-        )
-
-    def _velocity(self, forward_mps: float) -> Any:
-        nothing = (0.0, 0.0, 0.0)
-        return mavlink.MAVLink_set_position_target_local_ned_message(
-            0,
-            self._system_id,
-            TARGET_COMPONENT,
-            mavlink.MAV_FRAME_BODY_NED,
-            VELOCITY_MASK,
-            *nothing,
-            forward_mps,
-            0.0,
-            0.0,
-            *nothing,
-            0.0,
-            0.0,
-        )
 
     def _command(self, command: int, *values: float) -> None:
         parameters = [*values, *[0.0] * (7 - len(values))]

@@ -37,10 +37,10 @@ def read_tlog(name: str, kinds: Sequence[str]) -> Iterator[tuple[int, Any]]:
 
 
 def boot_clock(name: str) -> Callable[[int], float]:
-    """Host microseconds to the autopilot's microseconds since boot, out of a received telemetry log.
+    """Host microseconds to the autopilot's microseconds since boot, from a received telemetry log.
 
-    The two clocks drift apart by 0.2 parts in a thousand. A packet cannot come before it was sent, so the line through
-    the smallest delays of every ten seconds joins them to within about a millisecond.
+    The two clocks drift apart by 0.2 parts in a thousand. A packet cannot come before it was sent, so the
+    line through the smallest delays of every ten seconds joins them to within about a millisecond.
     """
     pairs = np.array([(us, m.time_boot_ms * 1000.0) for us, m in read_tlog(name, ["ATTITUDE"])])
     origin = pairs[0, 0]

@@ -1,4 +1,4 @@
-"""The ArduPilot model fed with what a companion sent in a recorded flight holds what ArduPilot's own log says."""
+"""The ArduPilot model, fed with what a companion sent in a recorded flight, holds what ArduPilot logged."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ OPEN_M = 20.0
 """What the log holds for a face without a reading: the message's max_distance."""
 
 RACE_MS = 4.0
-"""A log row this near to a message may hold the state before or after it: the clocks of host and autopilot are only
-joined to within a millisecond or two, and the autopilot reads its link at its own pace."""
+"""A log row this near to a message may hold the state before or after it: the clocks of host and autopilot
+are only joined to within a millisecond or two, and the autopilot reads its link at its own pace."""
 
 RAW_TOLERANCE_M = 0.02
 FILTERED_TOLERANCE_M = 0.10
@@ -64,7 +64,7 @@ def logged() -> dict[str, list[tuple[float, tuple[float, ...]]]]:
 def errors_m(
     rows: list[tuple[float, tuple[float, ...]]], states: list[Faces], attribute: str, race_ms: float
 ) -> list[float]:
-    """For each row the largest error of its faces, against the state that fits best of those within the race."""
+    """For each row the largest error of its faces, against the best state of those within the race."""
     found = []
     for at_ms, distances in rows:
         newest = max(index for index, state in enumerate(states) if state.at_ms <= at_ms)

@@ -12,13 +12,13 @@ from service.fake_autopilot.obstacle_words import UNKNOWN_WORD, ObstacleWords
 
 COMPANION, AUTOPILOT = 196, 1
 RACE_US = 25_000
-"""PX4 takes a message in, and streams its map, at its own pace: a map may still be without a message that was sent less
-than this before it was heard (seen in the recording: up to 24 ms)."""
+"""PX4 takes a message in, and streams its map, at its own pace: a map may still be without a message that was
+sent less than this before it was heard (seen in the recording: up to 24 ms)."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A map that PX4 streamed, the model's at that moment, and the model's without a message still on its way."""
+    """A map that PX4 streamed, the model's at that moment, and the model's without the message on its way."""
 
     at_us: int
     streamed: tuple[int, ...]
@@ -27,7 +27,7 @@ class Comparison:
 
 
 def compare(name: str) -> list[Comparison]:
-    """All maps of a recording. Collision Prevention begins, with an empty map, where the first one is streamed."""
+    """All maps of a recording. Collision Prevention begins, empty, where the first one is streamed."""
     found: list[Comparison] = []
     known = ObstacleMap()
     sent_us, before = 0, known.distances_cm
