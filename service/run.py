@@ -124,8 +124,10 @@ class Service:
             ConfigError: a network that cannot be used.
             LinkError: an autopilot endpoint that cannot be opened.
         """
-        # OpenCV's own threads would take the cores from inference.
+        # OpenCV's own threads would take the cores from inference; what it has to say of cameras that
+        # are not there, the reader says once and with the camera's name.
         cv2.setNumThreads(1)
+        cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
         self._started_ns = self._clock.now_ns()
         try:
             self._link.start()
