@@ -16,7 +16,8 @@ from uavdepth.scenes.rocks import add_boulder
 from uavdepth.scenes.shapes import box_uv, tube, unit_sphere
 from uavdepth.scenes.terrain import LandNoise, TerrainGrid, stretched_axis
 from uavdepth.scenes.textures_nature import NATURE_TEXTURES
-from uavdepth.scenes.vegetation import TreeKind, add_bush, add_far_tree, add_log, add_tree, add_tuft
+from uavdepth.scenes.undergrowth import add_bush, add_log, add_tuft
+from uavdepth.scenes.vegetation import TreeKind, add_far_tree, add_tree
 
 KINDS = get_args(TreeKind)
 

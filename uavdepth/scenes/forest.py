@@ -14,14 +14,8 @@ from uavdepth.scenes.mesh import MeshBuilder
 from uavdepth.scenes.rocks import add_boulder
 from uavdepth.scenes.shapes import box_uv, grid_faces
 from uavdepth.scenes.terrain import LandNoise, Values, fractal_land, stretched_axis
-from uavdepth.scenes.vegetation import (
-    TreeKind,
-    add_bush,
-    add_far_tree,
-    add_log,
-    add_tree,
-    add_tuft,
-)
+from uavdepth.scenes.undergrowth import add_bush, add_log, add_tuft
+from uavdepth.scenes.vegetation import TreeKind, add_far_tree, add_tree
 from uavdepth.scenes.weather import draw_weather
 
 _EXTENT_M = 68.0

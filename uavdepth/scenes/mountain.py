@@ -13,7 +13,8 @@ from uavdepth.scenes.mesh import MeshBuilder
 from uavdepth.scenes.rocks import add_boulder
 from uavdepth.scenes.shapes import box_uv
 from uavdepth.scenes.terrain import LandNoise, TerrainGrid, Values, fractal_land, smooth_step, stretched_axis
-from uavdepth.scenes.vegetation import TreeKind, add_bush, add_tree
+from uavdepth.scenes.undergrowth import add_bush
+from uavdepth.scenes.vegetation import TreeKind, add_tree
 from uavdepth.scenes.weather import draw_weather
 
 _CORE_M, _SPACING_M, _REACH_M = 156.0, 1.6, 1100.0
@@ -32,7 +33,6 @@ class _Valley:
     """
 
     def __init__(self, rng: np.random.Generator) -> None:
-        self._rng = rng
         self.cliff_north_m = rng.uniform(32.0, 38.0)
         self.cliff_height_m = rng.uniform(14.0, 30.0)
         self.water_m = -rng.uniform(1.0, 2.2)
@@ -61,9 +61,8 @@ class _Valley:
             self._river_half_m * (1.0 + 0.25 * self._meander.at(np.full_like(east, 300.0), east))
         )
 
-    def height_m(self, north: Values, east: Values) -> Values:
-        """Heights of land and river bed, 0 at the origin."""
-        rng = self._rng
+    def height_m(self, rng: np.random.Generator, north: Values, east: Values) -> Values:
+        """Heights of land and river bed, 0 at the origin; `rng` draws the noise."""
         across = north - self.bend_north_m(east)
         away = 1.0 - np.exp(-((east / 18.0) ** 2))
         foot = self.cliff_north_m + 12.0 * away * self._wiggle.at(np.zeros_like(east), east)
@@ -111,7 +110,7 @@ def build(seed: int) -> SceneDescription:
     valley = _Valley(rng)
     lines = stretched_axis(_CORE_M, _SPACING_M, _REACH_M)
     north, east = np.meshgrid(lines, lines, indexing="ij")
-    grid = TerrainGrid(lines, lines, valley.height_m(north, east))
+    grid = TerrainGrid(lines, lines, valley.height_m(rng, north, east))
     snow_line_m = float(rng.choice([-30.0, 8.0, 28.0, 55.0], p=[0.2, 0.2, 0.3, 0.3]))
 
     builder = MeshBuilder()

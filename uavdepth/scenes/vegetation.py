@@ -1,4 +1,4 @@
-"""Trees, bushes and logs, of a few hundred triangles each, with crowns ragged enough to look grown."""
+"""Trees of a few hundred triangles each, with crowns ragged enough to look grown."""
 
 from __future__ import annotations
 
@@ -8,21 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uavdepth.scenes.mesh import MeshBuilder
-from uavdepth.scenes.shapes import box_uv, lumpy_sphere, tube
+from uavdepth.scenes.shapes import box_uv, lumpy_sphere
+from uavdepth.scenes.tree_parts import ROOT_DEPTH_M, add_leaf_ball, add_trunk, add_tube, leaf_tint
 
 TreeKind = Literal["broadleaf", "poplar", "birch", "conifer", "snowy_conifer", "dead"]
-
-_ROOT_DEPTH_M = 0.4
-"""Trunks start below the ground so that no gap shows on slopes."""
-
-_LEAF_GREENS_BGR = (
-    (0.75, 1.0, 0.85),
-    (0.7, 1.0, 1.0),
-    (0.9, 1.0, 0.75),
-    (0.55, 0.95, 1.15),
-    (0.8, 0.85, 0.8),
-)
-_AUTUMN_BGR = ((0.35, 0.85, 1.5), (0.3, 0.6, 1.5), (0.4, 1.0, 1.4))
 
 
 def add_tree(
@@ -50,128 +39,19 @@ def add_tree(
     """
     foot = np.array([north_m, east_m, ground_down_m])
     radius = height_m * rng.uniform(0.014, 0.022) if trunk_radius_m is None else trunk_radius_m
-    tint = _leaf_tint(rng, autumn)
+    tint = leaf_tint(rng, autumn)
     if kind in ("conifer", "snowy_conifer"):
         _conifer(builder, rng, foot, height_m, radius, kind == "snowy_conifer")
     elif kind == "dead":
         _dead(builder, rng, foot, height_m, radius)
     elif kind == "poplar":
-        _trunk(builder, rng, foot, 0.6 * height_m, radius, "bark", sway=0.02)
+        add_trunk(builder, rng, foot, 0.6 * height_m, radius, "bark", sway=0.02)
         middle = foot - [0.0, 0.0, 0.58 * height_m]
         spread = height_m * rng.uniform(0.09, 0.13)
-        _leaf_ball(builder, rng, middle, (spread, spread, 0.43 * height_m), tint, 2, shards=50)
+        add_leaf_ball(builder, rng, middle, (spread, spread, 0.43 * height_m), tint, 2, shards=50)
     else:
         slender = kind == "birch"
         _broadleaf(builder, rng, foot, height_m, radius, tint, slender)
-
-
-def add_bush(
-    builder: MeshBuilder,
-    rng: np.random.Generator,
-    north_m: float,
-    east_m: float,
-    ground_down_m: float,
-    height_m: float,
-    autumn: float = 0.0,
-) -> None:
-    """Plant one bush, leaves down to the ground, about as wide as high."""
-    tint = _leaf_tint(rng, autumn)
-    for _ in range(int(rng.integers(1, 4))):
-        side = rng.normal(0.0, 0.3 * height_m, 2)
-        size = height_m * rng.uniform(0.4, 0.6)
-        centre = np.array([north_m + side[0], east_m + side[1], ground_down_m - 0.7 * size])
-        _leaf_ball(builder, rng, centre, (size, size, 0.8 * size), tint, 1, shards=24)
-
-
-def add_log(
-    builder: MeshBuilder,
-    rng: np.random.Generator,
-    north_m: float,
-    east_m: float,
-    ground_down_m: float,
-    length_m: float,
-    radius_m: float,
-) -> None:
-    """Lay one fallen trunk on the ground, in any direction, with a few broken branches."""
-    heading = rng.uniform(0.0, 2 * np.pi)
-    along = np.array([np.cos(heading), np.sin(heading), rng.normal(0.0, 0.03)])
-    centre = np.array([north_m, east_m, ground_down_m - 0.8 * radius_m])
-    steps = np.linspace(-0.5, 0.5, 5)[:, None] * length_m
-    line = centre + steps * along + rng.normal(0.0, 0.06, (5, 3)) * [1.0, 1.0, 0.4]
-    radii = radius_m * np.array([1.0, 0.95, 0.88, 0.8, 0.7])
-    shade = np.full(3, rng.uniform(0.7, 1.0))
-    _add_tube(builder, line, radii, 7, "bark", shade)
-    for end, radius in ((line[0], radii[0]), (line[-1], radii[-1])):
-        cap, faces = lumpy_sphere(rng, 0, (0.97 * radius,) * 3, 0.1)
-        builder.add(cap + end, faces, box_uv(cap, faces), "bark", shade * [0.9, 1.05, 1.15])
-    for _ in range(int(rng.integers(2, 5))):
-        start = line[int(rng.integers(1, 4))]
-        tip = start + rng.normal(0.0, 0.5, 3) * [1.0, 1.0, 0.3] - [0.0, 0.0, rng.uniform(0.3, 1.2)]
-        _add_tube(builder, np.array([start, tip]), [0.25 * radius_m, 0.02], 4, "bark", shade)
-
-
-def _leaf_tint(rng: np.random.Generator, autumn: float) -> NDArray[np.float64]:
-    palette = _AUTUMN_BGR if rng.random() < autumn else _LEAF_GREENS_BGR
-    return np.array(palette[int(rng.integers(len(palette)))]) * rng.uniform(0.75, 1.1)
-
-
-def _add_tube(
-    builder: MeshBuilder,
-    line: NDArray[np.float64],
-    radii: NDArray[np.float64] | list[float],
-    sides: int,
-    texture: str,
-    tint: NDArray[np.float64],
-) -> None:
-    (vertices, faces), uv = tube(line, radii, sides)
-    builder.add(vertices, faces, uv, texture, tint, smooth=sides > 4)
-
-
-def _trunk(
-    builder: MeshBuilder,
-    rng: np.random.Generator,
-    foot: NDArray[np.float64],
-    height_m: float,
-    radius_m: float,
-    texture: str,
-    sway: float,
-) -> NDArray[np.float64]:
-    """Add a trunk that widens at its roots. Returns its (5, 3) centre line from the foot to the top."""
-    heights = np.array([0.0, 0.06, 0.35, 0.7, 1.0]) * height_m
-    lean = np.cumsum(rng.normal(0.0, sway * height_m, (5, 2)) * [[0.0], [0.1], [0.6], [0.7], [0.6]], axis=0)
-    line = foot + np.column_stack([lean, -heights])
-    line[0, 2] = foot[2] + _ROOT_DEPTH_M
-    radii = radius_m * np.array([1.7, 1.08, 0.92, 0.66, 0.36])
-    _add_tube(builder, line, radii, 7, texture, np.full(3, rng.uniform(0.75, 1.1)))
-    return line
-
-
-def _leaf_ball(
-    builder: MeshBuilder,
-    rng: np.random.Generator,
-    centre: NDArray[np.float64],
-    radii_m: tuple[float, float, float],
-    tint: NDArray[np.float64],
-    subdivisions: int,
-    shards: int,
-) -> None:
-    """A cloud of leaves: a lumpy ball, darker below, with single twigs standing out of it."""
-    vertices, faces = lumpy_sphere(rng, subdivisions, radii_m, 0.3, 0.09)
-    height = -vertices[faces].mean(axis=1)[:, 2] / radii_m[2]
-    shade = (0.86 + 0.16 * height) * rng.uniform(0.9, 1.1, len(faces))
-    builder.add(vertices + centre, faces, box_uv(vertices + centre, faces), "leaves", tint * shade[:, None])
-
-    directions = rng.normal(0.0, 1.0, (shards, 3))
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    size = np.clip(0.3 * min(radii_m), 0.12, 0.5)
-    root = directions * np.array(radii_m) * rng.uniform(0.5, 0.8, (shards, 1))
-    across = np.cross(directions, rng.normal(0.0, 1.0, (shards, 3)))
-    across *= size / np.linalg.norm(across, axis=1, keepdims=True)
-    tip = directions * (np.array(radii_m) + size * rng.uniform(0.3, 1.3, (shards, 1)))
-    corners = np.stack([root - across, root + across, tip], axis=1).reshape(-1, 3) + centre
-    triangles = np.arange(3 * shards).reshape(-1, 3)
-    shade = rng.uniform(0.8, 1.2, (shards, 1))
-    builder.add(corners, triangles, box_uv(corners, triangles), "leaves", tint * shade)
 
 
 def _broadleaf(
@@ -184,7 +64,7 @@ def _broadleaf(
     slender: bool,
 ) -> None:
     bark = "birch_bark" if slender else "bark"
-    line = _trunk(builder, rng, foot, 0.8 * height_m, radius_m, bark, sway=0.035)
+    line = add_trunk(builder, rng, foot, 0.8 * height_m, radius_m, bark, sway=0.035)
     spread = 0.6 if slender else 1.0
     boughs = 3
     turn = rng.uniform(0.0, 2 * np.pi)
@@ -193,12 +73,12 @@ def _broadleaf(
         reach = spread * height_m * rng.uniform(0.14, 0.24)
         top = foot[2] - height_m * rng.uniform(0.5, 0.72)
         tip = np.array([line[3, 0] + reach * np.cos(heading), line[3, 1] + reach * np.sin(heading), top])
-        _add_tube(builder, np.array([line[2], tip]), [0.45 * radius_m, 0.03], 4, bark, np.ones(3))
+        add_tube(builder, np.array([line[2], tip]), [0.45 * radius_m, 0.03], 4, bark, np.ones(3))
         size = spread * height_m * rng.uniform(0.15, 0.22)
-        _leaf_ball(builder, rng, tip, (size, size, size * (1.1 if slender else 0.8)), tint, 1, shards=20)
+        add_leaf_ball(builder, rng, tip, (size, size, size * (1.1 if slender else 0.8)), tint, 1, shards=20)
     size = spread * height_m * rng.uniform(0.17, 0.22)
     rise = height_m * 0.2
-    _leaf_ball(builder, rng, line[4] + [0, 0, 0.2 * rise], (size, size, rise), tint * 1.08, 1, shards=20)
+    add_leaf_ball(builder, rng, line[4] + [0, 0, 0.2 * rise], (size, size, rise), tint * 1.08, 1, shards=20)
 
 
 def _conifer(
@@ -210,7 +90,7 @@ def _conifer(
     snowy: bool,
 ) -> None:
     """Skirts of drooping boughs around a straight trunk, each skirt a star whose tips hang."""
-    _trunk(builder, rng, foot, 0.9 * height_m, radius_m, "bark", sway=0.006)
+    add_trunk(builder, rng, foot, 0.9 * height_m, radius_m, "bark", sway=0.006)
     tiers = int(np.clip(height_m * 0.7, 5, 8))
     boughs = 8
     bare = rng.uniform(0.06, 0.22)
@@ -252,7 +132,7 @@ def _dead(
     height_m: float,
     radius_m: float,
 ) -> None:
-    line = _trunk(builder, rng, foot, height_m, radius_m, "bark", sway=0.03)
+    line = add_trunk(builder, rng, foot, height_m, radius_m, "bark", sway=0.03)
     for _ in range(int(rng.integers(8, 14))):
         part = rng.uniform(1.2, 3.9)
         start = line[int(part)] + (part % 1) * (line[int(part) + 1] - line[int(part)])
@@ -260,7 +140,7 @@ def _dead(
         reach = height_m * rng.uniform(0.06, 0.2)
         bend = start + reach * np.array([np.cos(heading), np.sin(heading), -rng.uniform(0.1, 0.9)])
         tip = bend + 0.6 * reach * (rng.normal(0.0, 0.5, 3) - [0.0, 0.0, 0.5])
-        _add_tube(
+        add_tube(
             builder,
             np.array([start, bend, tip]),
             [0.3 * radius_m, 0.15 * radius_m, 0.01],
@@ -268,22 +148,6 @@ def _dead(
             "bark",
             np.ones(3),
         )
-
-
-def add_tuft(builder: MeshBuilder, rng: np.random.Generator, height_m: float, texture: str = "grass") -> None:
-    """Grow one tuft of grass or fern at the origin: blades that lean outwards."""
-    blades = 9
-    heading = rng.uniform(0.0, 2 * np.pi, blades)
-    out = np.column_stack([np.cos(heading), np.sin(heading), np.zeros(blades)])
-    side = np.column_stack([-out[:, 1], out[:, 0], np.zeros(blades)]) * 0.13 * height_m
-    root = out * 0.08 * height_m
-    lean = rng.uniform(0.3, 0.9, (blades, 1)) * height_m
-    tip = root + out * lean - np.array([0.0, 0.0, 1.0]) * height_m * rng.uniform(0.6, 1.0, (blades, 1))
-    corners = np.stack([root - side, root + side, tip], axis=1).reshape(-1, 3)
-    faces = np.arange(3 * blades).reshape(-1, 3)
-    builder.add(
-        corners, faces, box_uv(corners, faces), texture, rng.uniform(0.7, 1.2, (blades, 1)) * np.ones(3)
-    )
 
 
 def add_far_tree(builder: MeshBuilder, rng: np.random.Generator, height_m: float, kind: TreeKind) -> None:
@@ -301,6 +165,6 @@ def add_far_tree(builder: MeshBuilder, rng: np.random.Generator, height_m: float
         width, half = 0.24 * height_m, 0.36 * height_m
         vertices, faces = lumpy_sphere(rng, 1, (width, width, half), 0.2, 0.08)
         vertices = vertices - [0.0, 0.0, 0.62 * height_m]
-        builder.add(vertices, faces, box_uv(vertices, faces), "leaves", _leaf_tint(rng, 0.0))
-    line = np.array([[0.0, 0.0, _ROOT_DEPTH_M], [0.0, 0.0, -0.6 * height_m]])
-    _add_tube(builder, line, [0.02 * height_m, 0.01 * height_m], 4, "bark", np.ones(3))
+        builder.add(vertices, faces, box_uv(vertices, faces), "leaves", leaf_tint(rng, 0.0))
+    line = np.array([[0.0, 0.0, ROOT_DEPTH_M], [0.0, 0.0, -0.6 * height_m]])
+    add_tube(builder, line, [0.02 * height_m, 0.01 * height_m], 4, "bark", np.ones(3))
