@@ -163,11 +163,9 @@ class ArduPilot(Controller):
         if self.mode == "LOITER":
             speed = self.parameters["LOIT_SPEED_MS"]
             sticks = self.sticks
-            return self._fly_limited(
-                sticks.forward * speed, sticks.right * speed, self._stick_climb(dt_s), dt_s
-            )
+            return self._fly_limited(sticks.forward * speed, sticks.right * speed, self._stick_climb(), dt_s)
         if self.mode == "ALT_HOLD":
-            return self._lean(dt_s)
+            return self._lean()
         return self.demand_for_velocity(0.0, 0.0, self._hold_height())
 
     def _guided(self, dt_s: float) -> Demand:
@@ -215,17 +213,17 @@ class ArduPilot(Controller):
         turn = self.sticks.yaw * FASTEST_TURN_RPS if yaw_rate_rps is None else yaw_rate_rps
         return self.demand_for_velocity(*self.vehicle.to_north_east(forward, right), climb_mps, turn)
 
-    def _lean(self, dt_s: float) -> Demand:
+    def _lean(self) -> Demand:
         """ALT_HOLD: the stick is a lean angle, and nothing looks after obstacles."""
         lean = 0.5 * self.vehicle.max_tilt_rad
         sticks = self.sticks
         north, east = self.vehicle.to_north_east(
             9.81 * math.tan(sticks.forward * lean), 9.81 * math.tan(sticks.right * lean)
         )
-        upright = self.demand_for_velocity(0.0, 0.0, self._stick_climb(dt_s))
+        upright = self.demand_for_velocity(0.0, 0.0, self._stick_climb())
         return Demand(north, east, upright.climb_mps2, sticks.yaw * FASTEST_TURN_RPS)
 
-    def _stick_climb(self, dt_s: float) -> float:
+    def _stick_climb(self) -> float:
         if self.sticks.up != 0.0 or self._height_target_m is None:
             self._height_target_m = self.height_m
             return self.sticks.up * FASTEST_CLIMB_MPS

@@ -200,6 +200,7 @@ class SimulatedAutopilot:
 
     def _command(self, channel: Channel, message: Any) -> None:
         answer = answer_command(self, channel.streams, message)
+        self._queue_texts()  # the reason of a refusal comes before the refusal
         channel.waiting.append(
             mavlink.MAVLink_command_ack_message(
                 message.command, answer.result, 0, 0, message.get_srcSystem(), message.get_srcComponent()

@@ -256,13 +256,12 @@ class Controller(ABC):
         east_mps: float,
         climb_mps: float,
         yaw_rate_rps: float = 0.0,
-        forward_feed: tuple[float, float] = (0.0, 0.0),
     ) -> Demand:
         """Accelerations that bring the vehicle to a velocity; drag is made up for, as an integrator would
         do."""
         vehicle = self.vehicle
-        north = SPEED_GAIN_PER_S * (north_mps - vehicle.velocity_north_mps) + forward_feed[0]
-        east = SPEED_GAIN_PER_S * (east_mps - vehicle.velocity_east_mps) + forward_feed[1]
+        north = SPEED_GAIN_PER_S * (north_mps - vehicle.velocity_north_mps)
+        east = SPEED_GAIN_PER_S * (east_mps - vehicle.velocity_east_mps)
         size = math.hypot(north, east)
         shrink = SPEED_LIMIT_MPS2 / size if size > SPEED_LIMIT_MPS2 else 1.0
         climb = CLIMB_GAIN_PER_S * (climb_mps + vehicle.velocity_down_mps)

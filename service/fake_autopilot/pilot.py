@@ -1,5 +1,4 @@
-"""A pilot at a ground station: flies a vehicle over a MAVLink link of its own, for demonstrations and
-tests."""
+"""A pilot at a ground station, who flies a vehicle over a MAVLink link of his own."""
 
 from __future__ import annotations
 
@@ -35,8 +34,7 @@ RECEIVE_BYTES = 65536
 
 
 class PilotError(UavDepthError):
-    """The vehicle refused, or did not do in time, what the pilot asked for; the text holds the autopilot's
-    own words."""
+    """The vehicle refused, or did not do in time, what was asked; the text holds the autopilot's own words."""
 
 
 class Pilot:
@@ -60,6 +58,7 @@ class Pilot:
         self._codec.robust_parsing = True
         self._socket = _connect(endpoint, timeout_s)
         self._heard = threading.Condition()
+        self._sending = threading.Lock()
         self._stopping = threading.Event()
         self._acks: dict[int, int] = {}
         self._texts: deque[str] = deque(maxlen=8)
@@ -279,12 +278,13 @@ class Pilot:
             self._height_m = message.relative_alt / 1000.0
 
     def _send(self, message: Any) -> None:
-        packet = message.pack(self._codec)
-        self._codec.seq = (self._codec.seq + 1) % 256
-        try:
-            self._socket.send(packet)
-        except OSError:
-            return  # the link is gone; whoever waits for an answer is told by its time-out
+        with self._sending:
+            packet = message.pack(self._codec)
+            self._codec.seq = (self._codec.seq + 1) % 256
+            try:
+                self._socket.sendall(packet)
+            except OSError:
+                return  # the link is gone; whoever waits for an answer is told by its time-out
 
 
 def _connect(endpoint: str, timeout_s: float) -> socket.socket:

@@ -28,7 +28,7 @@ def manual_control(system_id: int, forward: float) -> Any:
 
 
 def rc_override(system_id: int, forward: float) -> Any:
-    """RC_CHANNELS_OVERRIDE with the pitch stick forward (a low pulse) by a share of -1 to 1, the rest centred."""
+    """RC_CHANNELS_OVERRIDE with the pitch stick forward (a low pulse) by -1 to 1, the rest centred."""
     pitch_us = STICK_MIDDLE_US
     if forward != 0.0:
         size = STICK_DEAD_ZONE_US + abs(forward) * (STICK_TRAVEL_US - STICK_DEAD_ZONE_US)
