@@ -49,7 +49,13 @@ _RIVAL_DISTANCE = 0.3
 """A second peak of this share of the first, this far away in logs, makes the answer ambiguous."""
 
 _LARGEST_SPREAD = 0.2
-_LEAST_SLOPE = 0.5
+_SLOPES = (0.65, 1.4)
+"""Of log depth over log of the plane's depth. Level ground has 1, a wall 0; ground that falls or rises
+by 12 % lies at these ends, and there the factor is wrong by a quarter."""
+
+_SIGMA_OF_SLOPE = 0.5
+"""Error of the factor for each unit that the slope is off 1, measured on planes that fall and rise."""
+
 _MIN_LOG_REACH = 0.06
 _FLOOR_SIGMA = 0.02
 
@@ -91,11 +97,24 @@ class GroundScaler:
     The ground is taken as level. On a slope of s the factor is wrong by about s over the tangent of
     the angle at which the camera looks down (7 % for a slope of 2 % seen 16 degrees below the horizon).
 
+    What no picture tells: a level surface at another depth, such as a valley floor or a flat roof, with
+    none of the ground under the vehicle in view. For a network that is metric by itself say what
+    factors are plausible.
+
     Args:
         camera, mount: the camera and how it sits on the vehicle.
+        plausible: smallest and largest factor that is believed, or None for any.
+
+    Raises:
+        ValueError: plausible factors that are not 0 < smallest < largest.
     """
 
-    def __init__(self, camera: CameraModel, mount: CameraMount) -> None:
+    def __init__(
+        self, camera: CameraModel, mount: CameraMount, plausible: tuple[float, float] | None = None
+    ) -> None:
+        if plausible is not None and not 0 < plausible[0] < plausible[1]:
+            raise ValueError(f"plausible factors are {plausible}: 0 < smallest < largest is needed")
+        self._plausible = plausible or (0.0, math.inf)
         self.camera = camera
         self.mount = mount
         self._stride = max(1, round(camera.width / _COLUMNS))
@@ -118,7 +137,7 @@ class GroundScaler:
 
         Returns:
             None without height, below `MIN_HEIGHT_M`, with too few ground pixels, with two factors
-            equally likely, or where the picture's parts disagree.
+            equally likely, with one that is not plausible, or where the picture's parts disagree.
 
         Raises:
             ImageSizeError: depth that is not (H, W) of the camera.
@@ -139,10 +158,19 @@ class GroundScaler:
         near = np.abs(log_ratio - np.float32(mode)) < _GATE
         log_plane, log_ratio, tile = log_plane[near], log_ratio[near], tile[near]
         log_factor, gate = _refine(log_ratio, mode)
-        ground = np.abs(log_ratio - np.float32(log_factor)) < gate
-        if not _recedes(log_plane[ground], log_plane[ground] - log_ratio[ground]):
+        if not self._plausible[0] <= math.exp(log_factor) <= self._plausible[1]:
             return None
-        return _agreement(log_ratio, tile, log_factor)
+        ground = np.abs(log_ratio - np.float32(log_factor)) < gate
+        if log_plane[ground].std() < _MIN_LOG_REACH:
+            return None
+        slope = _slope(log_plane, log_plane - log_ratio)
+        if not _SLOPES[0] <= slope <= _SLOPES[1]:
+            return None
+        spread = _spread(log_ratio - np.float32(log_factor), tile)
+        if spread is None or spread > _LARGEST_SPREAD:
+            return None
+        sigma = math.hypot(_FLOOR_SIGMA, spread, _SIGMA_OF_SLOPE * (slope - 1.0))
+        return GroundScale(math.exp(log_factor), sigma, int(log_ratio.size))
 
     def _ratios(
         self, depth: NDArray[np.floating], attitude: Attitude, height_m: float
@@ -200,29 +228,20 @@ def _median(values: NDArray[np.floating]) -> float:
     return float(np.partition(values, middle)[middle])
 
 
-def _recedes(log_plane: NDArray[np.float32], log_depth: NDArray[np.float32]) -> bool:
-    """Whether depth grows with the plane's depth as ground does (slope 1), not as a wall (slope 0)."""
-    if log_plane.size < _MIN_PIXELS // 2:
-        return False
+def _slope(log_plane: NDArray[np.float32], log_depth: NDArray[np.float32]) -> float:
+    """Slope of log depth over the log of the plane's depth."""
     spread = log_plane - log_plane.mean()
-    variance = float(np.mean(spread * spread))
-    if variance < _MIN_LOG_REACH**2:
-        return False
-    return float(np.mean(spread * log_depth)) / variance >= _LEAST_SLOPE
+    return float(spread @ log_depth) / float(spread @ spread)
 
 
-def _agreement(
-    log_ratio: NDArray[np.float32], tile: NDArray[np.intp], log_factor: float
-) -> GroundScale | None:
-    """The scale with the spread of its tiles, or None where too few tiles see it or they disagree."""
+def _spread(error: NDArray[np.float32], tile: NDArray[np.intp]) -> float | None:
+    """How far the picture's tiles are apart, as one standard deviation, or None for too few tiles.
+
+    It is not divided by the number of tiles: neighbouring tiles err together.
+    """
     counts = np.bincount(tile, minlength=_TILES**2)
-    sums = np.bincount(tile, weights=log_ratio, minlength=_TILES**2)
     filled = counts >= _MIN_TILE_PIXELS
     if np.count_nonzero(filled) < _MIN_TILES:
         return None
-    errors = sums[filled] / counts[filled] - log_factor
-    spread = 1.4826 * _median(np.abs(errors))
-    if spread > _LARGEST_SPREAD:
-        return None
-    # Neighbouring tiles err together: their spread is taken as it is, not divided by their number.
-    return GroundScale(math.exp(log_factor), math.hypot(_FLOOR_SIGMA, spread), int(log_ratio.size))
+    sums = np.bincount(tile, weights=error, minlength=_TILES**2)
+    return 1.4826 * _median(np.abs(sums[filled] / counts[filled]))

@@ -8,9 +8,16 @@ import numpy as np
 import pytest
 from solids import box, depth_of, ground, pole, smooth_noise, wall
 
-from uavdepth import Attitude, CameraMount, GroundScaler, ImageSizeError, vertical_height_m
+from uavdepth import Attitude, CameraModel, CameraMount, GroundScaler, ImageSizeError, vertical_height_m
 
 CARS = [box((5 + 3 * i, -6 + 3.2 * i, 1.5), (8 + 3 * i, -3.5 + 3.2 * i, 3.0)) for i in range(4)]
+
+
+def slope(camera: CameraModel, height_m: float, rise: float) -> np.ndarray:
+    """Depth of a plane through the point `height_m` below a level camera that rises ahead by `rise`."""
+    down = camera.normalized_rays[..., 1].astype(np.float64) + rise
+    with np.errstate(divide="ignore"):
+        return np.where(down > 0, height_m / down, np.inf).astype(np.float32)
 
 
 class TestFactor:
@@ -110,6 +117,31 @@ class TestDoubt:
     def test_a_picture_without_depth_gives_none(self, camera, mount, level, value):
         network = np.full((320, 640), value, np.float32)
         assert GroundScaler(camera, mount).estimate(network, level, 3.0) is None
+
+    @pytest.mark.parametrize("rise", [-0.25, -0.15, 0.25])
+    def test_a_steep_slope_gives_none(self, camera, mount, level, rise):
+        assert GroundScaler(camera, mount).estimate(slope(camera, 3.0, rise), level, 3.0) is None
+
+    @pytest.mark.parametrize("rise", [-0.06, -0.03, 0.03, 0.06])
+    def test_the_error_of_a_gentle_slope_is_within_two_of_the_sigma_it_tells(
+        self, camera, mount, level, rise
+    ):
+        scale = GroundScaler(camera, mount).estimate(slope(camera, 3.0, rise), level, 3.0)
+        assert abs(math.log(scale.factor)) < 2 * scale.relative_sigma
+
+    def test_a_valley_floor_is_not_taken_for_the_ground_where_factors_must_be_plausible(
+        self, camera, mount, level
+    ):
+        network = depth_of([ground(20.0)], camera, mount, level)
+        anything, metric = GroundScaler(camera, mount), GroundScaler(camera, mount, plausible=(0.5, 2.0))
+        assert anything.estimate(network, level, 5.0).factor == pytest.approx(0.25, rel=0.01)
+        assert metric.estimate(network, level, 5.0) is None
+        assert metric.estimate(network, level, 18.0).factor == pytest.approx(0.9, rel=0.01)
+
+    @pytest.mark.parametrize("plausible", [(0.0, 1.0), (2.0, 1.0), (math.nan, 1.0)])
+    def test_plausible_factors_that_exclude_all_are_refused(self, camera, mount, plausible):
+        with pytest.raises(ValueError, match="plausible factors are"):
+            GroundScaler(camera, mount, plausible=plausible)
 
     def test_depth_of_another_size_is_refused(self, camera, mount, level):
         with pytest.raises(ImageSizeError, match=r"\(10, 10\).*\(320, 640\)"):
