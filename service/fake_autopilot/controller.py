@@ -21,6 +21,9 @@ VEHICLE_RADIUS_M = 0.35
 and its propellers."""
 
 COLLISION_CHECK_S = 0.02
+FASTEST_MPS = 20.0
+"""Faster than any vehicle here flies, falling from 20 m too."""
+
 FLOOR_CHECK_S = 0.05
 CLIMB_GAIN_PER_S = 4.0
 CLIMB_LIMIT_MPS2 = 4.0
@@ -294,7 +297,10 @@ class Controller(ABC):
         vehicle = self.vehicle
         if vehicle.floor_down_m - vehicle.down_m <= VEHICLE_RADIUS_M + 0.05:
             return  # standing on, or about to touch, the ground: that is landing
-        if self.world.clearance_m(vehicle.position_ned_m) < VEHICLE_RADIUS_M:
+        room_m = self.world.clearance_m(vehicle.position_ned_m) - VEHICLE_RADIUS_M
+        # The search through a scene's triangles is dear, and nothing can be hit before the room is flown through.
+        self._collision_check_s = self.now_s + max(room_m / FASTEST_MPS, COLLISION_CHECK_S)
+        if room_m < 0.0:
             self.collided = True
             self.armed = False
             vehicle.stop()

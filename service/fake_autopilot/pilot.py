@@ -34,7 +34,7 @@ RECEIVE_BYTES = 65536
 
 
 class PilotError(UavDepthError):
-    """The vehicle refused, or did not do in time, what was asked; the text holds the autopilot's own words."""
+    """The vehicle refused, or did not do in time, what was asked; the text holds the autopilot's words."""
 
 
 class Pilot:
