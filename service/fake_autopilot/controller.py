@@ -298,7 +298,8 @@ class Controller(ABC):
         if vehicle.floor_down_m - vehicle.down_m <= VEHICLE_RADIUS_M + 0.05:
             return  # standing on, or about to touch, the ground: that is landing
         room_m = self.world.clearance_m(vehicle.position_ned_m) - VEHICLE_RADIUS_M
-        # The search through a scene's triangles is dear, and nothing can be hit before the room is flown through.
+        # The search through a scene's triangles is dear, and nothing can be hit before the room is
+        # flown through.
         self._collision_check_s = self.now_s + max(room_m / FASTEST_MPS, COLLISION_CHECK_S)
         if room_m < 0.0:
             self.collided = True
