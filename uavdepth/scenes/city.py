@@ -1,0 +1,327 @@
+"""`city`: streets between blocks of houses, with trees, lamps, signs and parked cars."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from uavdepth.scenes.buildings import add_house
+from uavdepth.scenes.copies import Template, add_copies
+from uavdepth.scenes.description import SceneDescription
+from uavdepth.scenes.mesh import MeshBuilder
+from uavdepth.scenes.solids import Rect, add_slab, add_wall
+from uavdepth.scenes.street_furniture import add_car, add_lamp, add_sign, add_small_thing
+from uavdepth.scenes.textures_city import FACADE_CELL_M
+from uavdepth.scenes.undergrowth import add_bush
+from uavdepth.scenes.vegetation import TreeKind, add_tree
+from uavdepth.scenes.weather import draw_weather
+
+KERB_M = 0.15
+_PAVEMENT_M = 4.0
+_REACH_M = 130.0
+_HORIZON_M = 900.0
+_CORRIDOR_M = 3.4
+"""Nothing but the ground stands nearer than this to the straight line north of the origin."""
+
+_TREES: tuple[tuple[TreeKind, ...], ...] = (
+    ("broadleaf", "birch"),
+    ("broadleaf",),
+    ("poplar", "broadleaf"),
+    ("conifer", "broadleaf"),
+    ("dead", "conifer"),
+)
+
+
+@dataclass(frozen=True)
+class _Street:
+    """A street by its middle line and half the width of its road, metres."""
+
+    middle_m: float
+    half_road_m: float
+
+    @property
+    def half_width_m(self) -> float:
+        return self.half_road_m + _PAVEMENT_M
+
+
+@dataclass(frozen=True)
+class _Town:
+    rng: np.random.Generator
+    builder: MeshBuilder
+    trees: list[Template]
+    greenery: float
+    """Chance that a place for a tree has one."""
+    parked: float
+    """Chance that a place for a car has one."""
+    floors: tuple[int, int]
+    facade_north_m: float
+
+
+def build(seed: int) -> SceneDescription:
+    """The city of one seed: its origin lies in a street that ends at a facade to the north."""
+    rng = np.random.default_rng([seed, 0xC17])
+    builder = MeshBuilder()
+    facade_m = float(rng.uniform(33.0, 43.0))
+    cross = _street(rng)
+    easts = _along(rng, _Street(0.0, rng.uniform(5.0, 6.0)))
+    norths = _along(rng, _Street(facade_m - cross.half_width_m, cross.half_road_m))
+    low = int(rng.integers(2, 6))
+    kinds = _TREES[int(rng.integers(len(_TREES)))]
+    autumn = float(rng.choice([0.0, 0.0, 0.3, 0.9]))
+    templates = [_tree_template(rng, str(rng.choice(kinds)), autumn) for _ in range(4)]  # type: ignore[arg-type]
+    floors = (low, low + int(rng.integers(1, 6)))
+    town = _Town(rng, builder, templates, rng.uniform(0.15, 0.9), rng.uniform(0.15, 0.85), floors, facade_m)
+    _add_ground(town)
+    blocks = _blocks(easts, norths, facade_m)
+    for block in blocks:
+        _add_block(town, block)
+    _add_roads(town, easts, norths, facade_m)
+    weather = draw_weather(rng, (0.0006, 0.008))
+    return SceneDescription(
+        mesh=builder.build(),
+        ground_height_m=_ground_height(blocks),
+        sun_direction_ned=weather.sun_direction_ned,
+        sun_bgr=weather.sun_bgr,
+        ambient_bgr=weather.ambient_bgr,
+        sky_top_bgr=weather.sky_top_bgr,
+        sky_horizon_bgr=weather.sky_horizon_bgr,
+        haze_per_m=weather.haze_per_m,
+        cloud_amount=weather.cloud_amount,
+        extent_m=_REACH_M - 15.0,
+    )
+
+
+def _street(rng: np.random.Generator) -> _Street:
+    return _Street(0.0, float(rng.uniform(3.5, 6.5)))
+
+
+def _along(rng: np.random.Generator, first: _Street) -> list[_Street]:
+    """Streets on both sides of `first`, sorted, about 40 to 65 m apart."""
+    streets = [first]
+    for side in (-1.0, 1.0):
+        place = first.middle_m
+        while abs(place - first.middle_m) < _REACH_M - 40.0:
+            place += side * rng.uniform(42.0, 64.0)
+            streets.append(_Street(place, float(rng.uniform(3.5, 6.5))))
+    return sorted(streets, key=lambda street: street.middle_m)
+
+
+def _gaps(streets: list[_Street]) -> list[tuple[float, float]]:
+    """The stretches between streets, and the ones beyond the outermost."""
+    edges = [-_REACH_M - 60.0]
+    for street in streets:
+        edges += [street.middle_m - street.half_width_m, street.middle_m + street.half_width_m]
+    edges.append(_REACH_M + 60.0)
+    pairs = zip(edges[::2], edges[1::2], strict=True)
+    return [(low + _PAVEMENT_M, high - _PAVEMENT_M) for low, high in pairs if high - low > 16.0]
+
+
+def _blocks(easts: list[_Street], norths: list[_Street], facade_m: float) -> list[Rect]:
+    """Plots between the streets, without their pavements; north of the facade the street is built over."""
+    blocks = []
+    for north_low, north_high in _gaps(norths):
+        behind = abs(north_low - _PAVEMENT_M - facade_m) < 1.0
+        streets = [street for street in easts if not (behind and street.middle_m == 0.0)]
+        for east_low, east_high in _gaps(streets):
+            low = facade_m if behind else north_low
+            blocks.append(Rect(low, north_high, east_low, east_high))
+    return blocks
+
+
+def _ground_height(blocks: list[Rect]):  # type: ignore[no-untyped-def]
+    low = np.array([(b.north_low_m - _PAVEMENT_M, b.east_low_m - _PAVEMENT_M) for b in blocks])
+    high = np.array([(b.north_high_m + _PAVEMENT_M, b.east_high_m + _PAVEMENT_M) for b in blocks])
+
+    def height(north_m: ArrayLike, east_m: ArrayLike) -> NDArray[np.float64]:
+        place = np.stack(np.broadcast_arrays(north_m, east_m), axis=-1).astype(float)[..., None, :]
+        inside = ((place >= low) & (place <= high)).all(axis=-1).any(axis=-1)
+        return np.where(inside, KERB_M, 0.0)
+
+    return height
+
+
+def _add_ground(town: _Town) -> None:
+    """Asphalt in slabs of changing shade, so that the plane is not one tone."""
+    lines = np.concatenate([[-_HORIZON_M], np.arange(-_REACH_M - 60, _REACH_M + 61, 14.0), [_HORIZON_M]])
+    shade = town.rng.uniform(0.85, 1.1)
+    for i in range(len(lines) - 1):
+        for j in range(len(lines) - 1):
+            rect = Rect(lines[i], lines[i + 1], lines[j], lines[j + 1])
+            add_slab(town.builder, rect, 0.0, "asphalt", np.full(3, shade * town.rng.uniform(0.9, 1.1)))
+
+
+def _tree_template(rng: np.random.Generator, kind: TreeKind, autumn: float) -> Template:
+    height = float(rng.uniform(5.0, 9.0))
+    return Template.of(
+        lambda builder: add_tree(builder, rng, 0.0, 0.0, 0.0, height, kind, None, autumn), height
+    )
+
+
+def _add_block(town: _Town, block: Rect) -> None:
+    """Pavement, houses along the edges, a yard inside."""
+    rng, builder = town.rng, town.builder
+    pavement = block.shrunk(-_PAVEMENT_M)
+    stone = str(rng.choice(["paving", "paving", "cobbles", "concrete"]))
+    tint = np.full(3, rng.uniform(0.8, 1.08))
+    ring = pavement.corners
+    for start, end in zip(ring, ring[1:] + ring[:1], strict=True):
+        add_wall(builder, start, end, 0.0, KERB_M, "concrete", (1.0, 1.0, 1.0))
+    for strip in _frame(pavement, block):
+        add_slab(builder, strip, KERB_M, stone, tint)
+    add_slab(builder, block, KERB_M, str(rng.choice(["grass", "gravel", "concrete"])), tint)
+    for plot in _plots(rng, block):
+        front = abs(plot.north_low_m - town.facade_north_m) < 0.1
+        faces_origin = front and plot.east_low_m < 11.0 and plot.east_high_m > -11.0
+        if rng.random() < 0.1 and not faces_origin:
+            _add_garden(town, plot)
+            continue
+        floors = int(rng.integers(town.floors[0], town.floors[1] + 1))
+        add_house(builder, rng, plot, max(floors, 4) if faces_origin else floors, KERB_M)
+    _furnish(town, pavement)
+
+
+def _frame(outer: Rect, inner: Rect) -> list[Rect]:
+    """The four strips between two rectangles."""
+    return [
+        Rect(outer.north_low_m, inner.north_low_m, outer.east_low_m, outer.east_high_m),
+        Rect(inner.north_high_m, outer.north_high_m, outer.east_low_m, outer.east_high_m),
+        Rect(inner.north_low_m, inner.north_high_m, outer.east_low_m, inner.east_low_m),
+        Rect(inner.north_low_m, inner.north_high_m, inner.east_high_m, outer.east_high_m),
+    ]
+
+
+def _plots(rng: np.random.Generator, block: Rect) -> list[Rect]:
+    """House plots along the block's edges, their fronts a whole number of window cells wide."""
+    deep = min(rng.uniform(9.0, 13.0), 0.45 * (block.north_high_m - block.north_low_m))
+    plots = []
+    for low, high in (
+        (block.north_low_m, block.north_low_m + deep),
+        (block.north_high_m - deep, block.north_high_m),
+    ):
+        plots += [Rect(low, high, a, b) for a, b in _lots(rng, block.east_low_m, block.east_high_m)]
+    inner_low, inner_high = block.north_low_m + deep, block.north_high_m - deep
+    if inner_high - inner_low > 9.0:
+        for low, high in (
+            (block.east_low_m, block.east_low_m + deep),
+            (block.east_high_m - deep, block.east_high_m),
+        ):
+            plots += [Rect(a, b, low, high) for a, b in _lots(rng, inner_low, inner_high)]
+    return plots
+
+
+def _lots(rng: np.random.Generator, low_m: float, high_m: float) -> list[tuple[float, float]]:
+    lots = []
+    place = low_m
+    while high_m - place >= 2 * FACADE_CELL_M:
+        width = FACADE_CELL_M * int(rng.integers(3, 8))
+        if high_m - place - width < 2 * FACADE_CELL_M:
+            width = high_m - place
+        lots.append((place, place + width))
+        place += width
+    return lots
+
+
+def _add_garden(town: _Town, plot: Rect) -> None:
+    """A gap between houses: grass, bushes and a few trees."""
+    rng = town.rng
+    add_slab(town.builder, plot, KERB_M + 0.02, "grass")
+    for _ in range(3):
+        place = _inside(rng, plot)
+        add_copies(
+            town.builder, rng, town.trees[int(rng.integers(4))], _feet([place]), rng.uniform(4.0, 9.0, 1)
+        )
+        add_bush(town.builder, rng, *_inside(rng, plot), -KERB_M, rng.uniform(0.8, 2.0))
+
+
+def _inside(rng: np.random.Generator, plot: Rect) -> tuple[float, float]:
+    return (
+        float(rng.uniform(plot.north_low_m + 1, plot.north_high_m - 1)),
+        float(rng.uniform(plot.east_low_m + 1, plot.east_high_m - 1)),
+    )
+
+
+def _feet(places: list[tuple[float, float]]) -> NDArray[np.float64]:
+    return np.array([(north, east, -KERB_M) for north, east in places], float).reshape(-1, 3)
+
+
+def _furnish(town: _Town, pavement: Rect) -> None:
+    """Trees, lamps, signs and small things along the kerb."""
+    rng = town.rng
+    planted: list[tuple[float, float]] = []
+    edges = (
+        (0, pavement.north_low_m + 0.9, pavement.east_low_m, pavement.east_high_m, (-1.0, 0.0)),
+        (0, pavement.north_high_m - 0.9, pavement.east_low_m, pavement.east_high_m, (1.0, 0.0)),
+        (1, pavement.east_low_m + 0.9, pavement.north_low_m, pavement.north_high_m, (0.0, -1.0)),
+        (1, pavement.east_high_m - 0.9, pavement.north_low_m, pavement.north_high_m, (0.0, 1.0)),
+    )
+    for axis, line_m, low_m, high_m, outwards in edges:
+        for number, along_m in enumerate(np.arange(low_m + 3.0, high_m - 2.0, 5.5)):
+            place = (line_m, float(along_m)) if axis == 0 else (float(along_m), line_m)
+            if abs(place[0]) > _REACH_M or abs(place[1]) > _REACH_M or not _off_corridor(place, 1.2):
+                continue
+            if number % 4 == 0:
+                add_lamp(town.builder, rng, *place, KERB_M, outwards)
+            elif rng.random() < town.greenery:
+                planted.append(place)
+            elif rng.random() < 0.35:
+                facing = float(np.arctan2(outwards[1], outwards[0])) + (
+                    np.pi / 2 if rng.random() < 0.7 else 0.0
+                )
+                add_sign(town.builder, rng, *place, KERB_M, facing)
+            elif rng.random() < 0.5:
+                add_small_thing(town.builder, rng, *place, KERB_M)
+    feet = _feet(planted)
+    which = rng.integers(len(town.trees), size=len(feet))
+    heights = rng.uniform(4.0, 8.5, len(feet))
+    for number, template in enumerate(town.trees):
+        here = which == number
+        reach = template.reach * heights
+        here &= np.array(
+            [_off_corridor((foot[0], foot[1]), r) for foot, r in zip(feet, reach, strict=True)], bool
+        )
+        add_copies(town.builder, rng, template, feet[here], heights[here])
+
+
+def _off_corridor(place: tuple[float, float], reach_m: float) -> bool:
+    """Whether a thing stands clear of the line that the vehicle takes north from the origin."""
+    north, east = place
+    return not (-6.0 < north < 46.0 and abs(east) < _CORRIDOR_M + reach_m)
+
+
+def _add_roads(town: _Town, easts: list[_Street], norths: list[_Street], facade_m: float) -> None:
+    """Lane markings and parked cars."""
+    for axis, streets, others in ((1, easts, norths), (0, norths, easts)):
+        for street in streets:
+            for along_m in np.arange(-_REACH_M, _REACH_M, 6.0):
+                if (
+                    axis == 1
+                    and street.middle_m == 0.0
+                    and along_m > facade_m - 16.0
+                    and along_m < facade_m + 70.0
+                ):
+                    continue
+                near = min(abs(along_m - other.middle_m) - other.half_width_m for other in others)
+                if near < 2.0:
+                    continue
+                _mark_and_park(town, axis, street, float(along_m))
+
+
+def _mark_and_park(town: _Town, axis: int, street: _Street, along_m: float) -> None:
+    rng = town.rng
+
+    def place(side_m: float, ahead_m: float = 0.0) -> tuple[float, float]:
+        across, along = street.middle_m + side_m, along_m + ahead_m
+        return (along, across) if axis == 1 else (across, along)
+
+    low, high = place(-0.07, -1.5), place(0.07, 1.5)
+    add_slab(town.builder, Rect(low[0], high[0], low[1], high[1]), 0.006, "marking")
+    for side in (-1.0, 1.0):
+        if rng.random() > town.parked:
+            continue
+        spot = place(side * (street.half_road_m - 1.05), rng.uniform(-0.5, 0.5))
+        if not _off_corridor(spot, 1.0) or (abs(spot[1]) < 9.0 and abs(spot[0] - town.facade_north_m) < 14.0):
+            continue
+        heading = (0.0 if axis == 1 else np.pi / 2) + (np.pi if rng.random() < 0.5 else 0.0)
+        add_car(town.builder, rng, *spot, 0.0, heading + rng.normal(0.0, 0.02))

@@ -1,0 +1,107 @@
+"""`wall`: one long wall across open ground."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from uavdepth.scenes.description import SceneDescription
+from uavdepth.scenes.mesh import MeshBuilder
+from uavdepth.scenes.solids import Rect, add_box, add_slab
+from uavdepth.scenes.street_furniture import add_car, add_lamp, add_sign, add_small_thing
+from uavdepth.scenes.undergrowth import add_bush
+from uavdepth.scenes.vegetation import add_tree
+from uavdepth.scenes.weather import draw_weather
+
+_WALLS = ("brick", "concrete", "corrugated", "plaster", "panel_facade", "brick_facade")
+_GROUNDS = ("grass", "gravel", "asphalt", "concrete", "soil", "paving")
+_HALF_M = 90.0
+_HORIZON_M = 700.0
+_CORRIDOR_M = 4.0
+
+
+def build(seed: int) -> SceneDescription:
+    """The wall of one seed, frontal to the origin 31 to 44 m north of it."""
+    rng = np.random.default_rng([seed, 0x3A11])
+    builder = MeshBuilder()
+    north_m = float(rng.uniform(31.0, 44.0))
+    height_m = 3.0 * int(rng.integers(3, 7))
+    ground = str(rng.choice(_GROUNDS))
+    lines = np.concatenate([[-_HORIZON_M], np.arange(-_HALF_M, _HALF_M + 1, 12.0), [_HORIZON_M]])
+    for i in range(len(lines) - 1):
+        for j in range(len(lines) - 1):
+            rect = Rect(lines[i], lines[i + 1], lines[j], lines[j + 1])
+            add_slab(builder, rect, 0.0, ground, np.full(3, rng.uniform(0.85, 1.1)))
+    half = float(rng.uniform(20.0, 70.0))
+    tint = rng.uniform(0.8, 1.1) * rng.uniform(0.93, 1.07, 3)
+    texture = str(rng.choice(_WALLS))
+    add_box(
+        builder, (north_m + 1.5, 0.0), (3.0, 2 * half), 0.0, height_m, texture, tint, top_texture="concrete"
+    )
+    for east_m in np.arange(-half + 4.0, half, rng.uniform(7.0, 14.0)):
+        if rng.random() < 0.5:
+            add_box(builder, (north_m - 0.15, float(east_m)), (0.3, 0.6), 0.0, height_m, "concrete", tint)
+    _add_things(builder, rng, north_m)
+    weather = draw_weather(rng, (0.0005, 0.006))
+    return SceneDescription(
+        mesh=builder.build(),
+        ground_height_m=_flat,
+        sun_direction_ned=weather.sun_direction_ned,
+        sun_bgr=weather.sun_bgr,
+        ambient_bgr=weather.ambient_bgr,
+        sky_top_bgr=weather.sky_top_bgr,
+        sky_horizon_bgr=weather.sky_horizon_bgr,
+        haze_per_m=weather.haze_per_m,
+        cloud_amount=weather.cloud_amount,
+        extent_m=_HALF_M - 15.0,
+    )
+
+
+def _flat(north_m: ArrayLike, east_m: ArrayLike) -> NDArray[np.float64]:
+    return np.zeros(np.broadcast(north_m, east_m).shape)
+
+
+def _add_things(builder: MeshBuilder, rng: np.random.Generator, wall_m: float) -> None:
+    """Boxes, containers, poles, cars and trees beside the corridor and behind the start."""
+    for _ in range(int(rng.integers(25, 60))):
+        north, east = rng.uniform(-_HALF_M + 10, _HALF_M - 10, 2)
+        in_corridor = -8.0 < north < wall_m + 1.0 and abs(east) < _CORRIDOR_M + 3.0
+        if in_corridor or abs(north - wall_m - 1.5) < 5.0:
+            continue
+        kind = int(rng.integers(7))
+        if kind == 0:
+            size = rng.uniform(0.5, 2.5, 3)
+            texture = str(rng.choice(["concrete", "corrugated", "brick", "board"]))
+            add_box(
+                builder,
+                (north, east),
+                (size[0], size[1]),
+                0.0,
+                size[2],
+                texture,
+                rng.uniform(0.7, 1.1, 3),
+                rng.uniform(0, 3),
+            )
+        elif kind == 1:
+            add_box(
+                builder,
+                (north, east),
+                (6.06, 2.44),
+                0.0,
+                2.59,
+                "corrugated",
+                rng.uniform(0.5, 1.1, 3),
+                rng.uniform(0, 3),
+            )
+        elif kind == 2:
+            turn = rng.uniform(0, 2 * np.pi)
+            add_lamp(builder, rng, north, east, 0.0, (float(np.cos(turn)), float(np.sin(turn))))
+        elif kind == 3:
+            add_car(builder, rng, north, east, 0.0, rng.uniform(0, 2 * np.pi))
+        elif kind == 4:
+            add_tree(builder, rng, north, east, 0.0, rng.uniform(4.0, 9.0))
+        elif kind == 5:
+            add_sign(builder, rng, north, east, 0.0, rng.uniform(0, np.pi))
+            add_small_thing(builder, rng, north + 1.5, east, 0.0)
+        else:
+            add_bush(builder, rng, north, east, 0.0, rng.uniform(0.8, 2.0))
