@@ -13,7 +13,7 @@ from uavdepth.band_view import BandView, seen_sectors
 from uavdepth.body_rays import body_rays
 from uavdepth.camera import CameraModel, CameraMount
 from uavdepth.errors import ImageSizeError, ScanError
-from uavdepth.level_ground import LevelGround, find_level_ground
+from uavdepth.level_ground import GROUND_DEPTH_SHARE, LevelGround, find_level_ground
 from uavdepth.obstacle_scan import SECTOR_WIDTH_DEG, ObstacleScan, SectorState, sector_bearings_deg
 from uavdepth.range_histogram import RangeHistogram
 
@@ -67,6 +67,8 @@ class ObstacleScanner:
         below_m, above_m: the height band from the vehicle's origin, metres.
         min_pixels: pixels that make an obstacle at maximum distance; None: a square of
             `SMALLEST_SIZE_M` there, but at least 6.
+        ground_tolerance: relative error of depth that must not make an obstacle of the ground, 0 to
+            0.5. What rises less than this share of the height is lost among the ground.
 
     Raises:
         ScanError: distances that are not finite with 0 < min < max, a band without height.
@@ -85,6 +87,7 @@ class ObstacleScanner:
         below_m: float = 2.0,
         above_m: float = 1.5,
         min_pixels: int | None = None,
+        ground_tolerance: float = GROUND_DEPTH_SHARE,
     ) -> None:
         if not (math.isfinite(max_distance_m) and 0.01 <= min_distance_m < max_distance_m <= 599.0):
             raise ScanError(
@@ -95,12 +98,15 @@ class ObstacleScanner:
                 raise ScanError(f"{name} is {value}: a finite height above 0 m is needed")
         if min_pixels is not None and min_pixels < 1:
             raise ScanError(f"min_pixels is {min_pixels}: at least 1 is needed")
+        if not 0.0 <= ground_tolerance <= 0.5:
+            raise ScanError(f"ground_tolerance is {ground_tolerance}: 0 to 0.5 is needed")
         self.camera = camera
         self.mount = mount
         self.min_distance_m = float(min_distance_m)
         self.max_distance_m = float(max_distance_m)
         self.below_m = float(below_m)
         self.above_m = float(above_m)
+        self._ground_tolerance = ground_tolerance
         self._together = max(1, round(camera.height / _ROWS_WORKED_ON))
         rays = body_rays(camera, mount)
         self._rays = rays.reshape(3, -1)
@@ -215,14 +221,14 @@ class ObstacleScanner:
         self, depth: NDArray[np.float32], level: NDArray[np.float64], height_m: float | None
     ) -> LevelGround | None:
         if height_m is not None and math.isfinite(height_m) and height_m > 0:
-            return LevelGround.below(height_m)
+            return LevelGround.below(height_m, self._ground_tolerance)
         start = _GROUND_STRIDE // 2
         sparse = depth[start::_GROUND_STRIDE, start::_GROUND_STRIDE].ravel()
         sparse = np.where(sparse > 0, sparse, np.float32(np.nan))
         points, range_m = self._level_points(self._ground_rays, sparse, level)
         directions = level[2].astype(np.float32) @ self._ground_rays
         directions /= np.linalg.norm(self._ground_rays, axis=0)
-        return find_level_ground(points[2], range_m, directions)
+        return find_level_ground(points[2], range_m, directions, self._ground_tolerance)
 
     def _needed_pixels(self, min_pixels: int | None) -> NDArray[np.int64]:
         """(bins,) joined pixels that make an obstacle at each distance of the histogram."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import cv2
 import numpy as np
 import pytest
 from solids import box, depth_of, ground, pole, smooth_noise, wall
@@ -132,6 +133,21 @@ class TestGround:
             depth *= smooth_noise(rng, depth.shape, 0.05)
             depth *= rng.normal(1.0, 0.02, depth.shape).astype(np.float32)
             assert obstacles(scanner.scan(depth, attitude, height)) == [], f"{attitude}"
+
+    def test_ground_stays_ground_when_a_coarse_network_is_brought_to_the_cameras_pixels(self, camera, mount):
+        scanner = ObstacleScanner(camera, mount)
+        rng = np.random.default_rng(9)
+        for _ in range(50):
+            height = float(rng.uniform(0.5, 6))
+            attitude = attitude_deg(rng.uniform(-30, 30), rng.uniform(-30, 30))
+            coarse = depth_of([ground(height)], camera.scaled(384, 192), mount, attitude)
+            depth = cv2.resize(coarse, (640, 320), interpolation=cv2.INTER_NEAREST_EXACT)
+            assert obstacles(scanner.scan(depth, attitude, height)) == [], f"height {height}, {attitude}"
+
+    def test_a_larger_tolerance_forgives_larger_errors(self, camera, mount, level):
+        depth = depth_of([ground(2.0)], camera, mount, level) * np.float32(0.72)
+        assert obstacles(ObstacleScanner(camera, mount, ground_tolerance=0.2).scan(depth, level, 2.0))
+        assert not obstacles(ObstacleScanner(camera, mount, ground_tolerance=0.3).scan(depth, level, 2.0))
 
     @pytest.mark.parametrize("error_deg", [-1.5, 1.5])
     @pytest.mark.parametrize("height", [1.0, 2.0, 4.0])
@@ -363,6 +379,7 @@ class TestBadInput:
             ({"below_m": 0.0}, "below_m is 0.0"),
             ({"above_m": -1.0}, "above_m is -1.0"),
             ({"min_pixels": 0}, "min_pixels is 0"),
+            ({"ground_tolerance": 0.6}, "ground_tolerance is 0.6"),
         ],
     )
     def test_impossible_settings_are_refused_by_value(self, camera, mount, settings, text):
