@@ -11,19 +11,20 @@ import structlog
 
 from service.autopilot.link import AutopilotLink
 from service.autopilot.link_status import LinkStatus
-from service.autopilot.rate_meter import RateMeter
 from service.autopilot.service_state import ServiceState
 from service.cameras.camera import Camera
 from service.cameras.reader import CameraReader, CameraState
 from service.cameras.source import make_camera
 from service.clock import Clock, MonotonicClock
 from service.frame import Frame
-from service.health import Announcer, Vitals, state_of, trouble_of
+from service.health import SEVERITY_WARNING
 from service.latest_slot import LatestSlot
+from service.monitor import Monitor
 from service.pipeline import Perception, PerceptionResult
+from service.progress import Progress
 from service.publisher.publisher import ZenohPublisher
 from service.settings import Settings
-from service.status import Drops, LatencyMeter, ServiceStatus, resident_memory_mib
+from service.status import Drops, ServiceStatus, resident_memory_mib
 from service.status_sample import status_sample
 from service.telemetry import Telemetry
 from service.trouble import Trouble
@@ -33,13 +34,9 @@ from uavdepth.obstacle_scan import ObstacleScan
 log = structlog.get_logger()
 
 _TAKE_S = 0.1
-_MONITOR_S = 0.05
 _JOIN_TIMEOUT_S = 3.0
 _LAST_WORDS_S = 0.1
 """Several turns of the link's thread: time for the last STATUSTEXT to leave."""
-
-_STEP_MEMORY = 0.9
-"""Share of the old mean in the running mean of the step's time."""
 
 
 class Link(Protocol):
@@ -99,23 +96,21 @@ class Service:
         self._perception: Perception | None = None
         self._stopping = threading.Event()
         self._stopped = False
-        self._threads: list[threading.Thread] = []
         self._subscribers: list[LatestSlot[PerceptionResult]] = []
         self._subscribers_lock = threading.Lock()
-        self._last_result: PerceptionResult | None = None
-        self._result_ns: int | None = None
-        self._sent_ns: int | None = None
-        self._was_armed: bool | None = None
-        self._armed_ns: int | None = None
         self._started_ns = self._clock.now_ns()
-        self._state = ServiceState.BOOT
-        self._trouble: Trouble | None = Trouble.STARTING
-        self._meters_lock = threading.Lock()
-        self._frame_meter = RateMeter()
-        self._latency = LatencyMeter()
-        self._measured = 0
-        self._sent = 0
-        self._step_ms: float | None = None
+        self._progress = Progress(self._started_ns)
+        self._thread = threading.Thread(target=self._perceive, name="perception", daemon=True)
+        publisher = self._publisher
+        self._monitor = Monitor(
+            self._clock,
+            self._link,
+            self._reader,
+            self._progress,
+            self._started_ns,
+            None if publisher is None else lambda: publisher.offer_status(status_sample(self.status())),
+            round(1e9 / settings.zenoh.status_rate_hz),
+        )
 
     def start(self) -> None:
         """Start everything; returns when the network is loaded, while the camera may still be opening.
@@ -128,7 +123,6 @@ class Service:
         # are not there, the reader says once and with the camera's name.
         cv2.setNumThreads(1)
         cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-        self._started_ns = self._clock.now_ns()
         try:
             self._link.start()
             self._link.set_state(ServiceState.BOOT)
@@ -139,10 +133,8 @@ class Service:
         except UavDepthError:
             self.stop()
             raise
-        for name, work in (("perception", self._perceive), ("monitor", self._watch)):
-            thread = threading.Thread(target=work, name=name, daemon=True)
-            thread.start()
-            self._threads.append(thread)
+        self._thread.start()
+        self._monitor.start()
 
     def stop(self) -> None:
         """Stop everything, tell the pilot, let go of devices and ports. May be called twice."""
@@ -152,13 +144,14 @@ class Service:
         self._stopping.set()
         self._frames.close()
         self._reader.stop()
-        for thread in self._threads:
-            thread.join(_JOIN_TIMEOUT_S)
+        self._monitor.stop()
+        if self._thread.is_alive():
+            self._thread.join(_JOIN_TIMEOUT_S)
         if self._publisher is not None:
             self._publisher.close()
-        if self._threads:
+        if self._perception is not None:
             self._link.set_state(ServiceState.STANDBY)
-            self._link.say(4, "uavdepth OFF: stopped")
+            self._link.say(SEVERITY_WARNING, "uavdepth OFF: stopped")
             threading.Event().wait(_LAST_WORDS_S)
         self._link.close()
         with self._subscribers_lock:
@@ -178,7 +171,7 @@ class Service:
     @property
     def last_result(self) -> PerceptionResult | None:
         """What became of the newest measured picture."""
-        return self._last_result
+        return self._progress.result
 
     def subscribe(self) -> LatestSlot[PerceptionResult]:
         """A slot that gets every result from now on; a slow taker delays nobody. Close it to end."""
@@ -191,22 +184,19 @@ class Service:
         """The service now."""
         now_ns = self._clock.now_ns()
         link = self._link.status()
-        result = self._last_result
-        publisher = self._publisher
-        with self._meters_lock:
-            frames_per_s = self._frame_meter.per_second(now_ns, self._started_ns)
-            latency = self._latency.latency
+        progress, publisher = self._progress, self._publisher
+        result = progress.result
         return ServiceStatus(
             vehicle=self._settings.vehicle.name,
             uptime_s=(now_ns - self._started_ns) / 1e9,
-            state=self._state,
-            trouble=self._trouble,
-            frames=self._measured,
-            frames_per_s=frames_per_s,
-            step_ms=self._step_ms,
-            obstacle_messages=self._sent,
+            state=self._monitor.state,
+            trouble=self._monitor.trouble,
+            frames=progress.frames,
+            frames_per_s=progress.frames_per_s(now_ns),
+            step_ms=progress.step_ms,
+            obstacle_messages=progress.messages,
             obstacle_rate_hz=link.obstacle_rate_hz,
-            latency=latency,
+            latency=progress.latency,
             drops=Drops(self._frames.dropped_count, 0 if publisher is None else publisher.dropped_count),
             model_failures=0 if self._perception is None else self._perception.model_failures,
             scale=None if result is None else result.scale,
@@ -243,21 +233,9 @@ class Service:
         max_age_ns = round(self._settings.autopilot.max_frame_age_s * 1e9)
         if result.trusted and done_ns - frame.captured_ns > max_age_ns:
             result = result.distrusted(Trouble.STALE_FRAME)
-        sent = result.trusted and self._link.send_obstacles(result.scan, frame.captured_ns)
-        sent_ns = self._clock.now_ns()
-        with self._meters_lock:
-            self._frame_meter.add(done_ns)
-            if sent:
-                self._latency.add(sent_ns - frame.captured_ns)
-        if sent:
-            self._sent += 1
-            self._sent_ns = sent_ns
-        self._measured += 1
-        step_ms = (done_ns - begun_ns) / 1e6
-        old_ms = step_ms if self._step_ms is None else self._step_ms
-        self._step_ms = _STEP_MEMORY * old_ms + (1 - _STEP_MEMORY) * step_ms
-        self._last_result = result
-        self._result_ns = done_ns
+        if result.trusted and self._link.send_obstacles(result.scan, frame.captured_ns):
+            self._progress.sent(frame.captured_ns, self._clock.now_ns())
+        self._progress.measured(result, begun_ns, done_ns)
         self._hand_out(result)
 
     def _stands_ready(self, result: PerceptionResult) -> bool:
@@ -277,54 +255,3 @@ class Service:
             self._subscribers = [slot for slot in self._subscribers if not slot.closed]
             for slot in self._subscribers:
                 slot.put(result)
-
-    # -- the monitor thread
-
-    def _watch(self) -> None:
-        announcer = Announcer()
-        status_period_ns = round(1e9 / self._settings.zenoh.status_rate_hz)
-        status_due_ns = self._clock.now_ns()
-        while not self._stopping.wait(_MONITOR_S):
-            try:
-                self._judge(announcer)
-                if self._publisher is not None and self._clock.now_ns() >= status_due_ns:
-                    status_due_ns = self._clock.now_ns() + status_period_ns
-                    self._publisher.offer_status(status_sample(self.status()))
-            except Exception:
-                # The monitor must outlive whatever it monitors.
-                log.exception("monitor broke")
-
-    def _judge(self, announcer: Announcer) -> None:
-        camera, link, result = self._reader.status, self._link.status(), self._last_result
-        vitals = Vitals(
-            now_ns=self._clock.now_ns(),
-            started_ns=self._started_ns,
-            camera=camera.state,
-            link_connected=link.connected,
-            armed=link.armed,
-            frame_ns=camera.newest_ns,
-            result_ns=self._result_ns,
-            result_trouble=None if result is None else result.trouble,
-            sent_ns=self._sent_ns,
-            armed_ns=self._note_arming(link.armed),
-        )
-        self._trouble = trouble_of(vitals)
-        self._state = state_of(self._trouble, vitals)
-        self._link.set_state(self._state)
-        words = announcer.hear(self._trouble, self._state, vitals.now_ns)
-        if words is not None:
-            self._link.say(words.severity, words.text)
-            log.info(words.text, state=self._state.name, detail=_detail(result, camera.detail, link))
-
-    def _note_arming(self, armed: bool | None) -> int | None:
-        """When the vehicle was armed last; `armed` is what it is now."""
-        if armed and self._was_armed is False:
-            self._armed_ns = self._clock.now_ns()
-        if armed is not None:
-            self._was_armed = armed
-        return self._armed_ns
-
-
-def _detail(result: PerceptionResult | None, camera_detail: str, link: LinkStatus) -> str:
-    parts = [camera_detail, link.problem or "", "" if result is None else result.detail]
-    return "; ".join(part for part in parts if part)

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
-
-import numpy as np
 
 from service.autopilot.link_status import LinkStatus
 from service.autopilot.service_state import ServiceState
@@ -28,30 +25,6 @@ class Latency:
 
     p50_ms: float
     p95_ms: float
-
-
-class LatencyMeter:
-    """Remembers the delays of the last messages.
-
-    Args:
-        count: how many.
-    """
-
-    def __init__(self, count: int = 450) -> None:
-        self._delays_ms: deque[float] = deque(maxlen=count)
-
-    def add(self, delay_ns: int) -> None:
-        """Count one delay in nanoseconds."""
-        self._delays_ms.append(delay_ns / 1e6)
-
-    @property
-    def latency(self) -> Latency | None:
-        """The percentiles, or None before the first delay."""
-        delays = list(self._delays_ms)
-        if not delays:
-            return None
-        p50, p95 = np.percentile(delays, [50, 95])
-        return Latency(float(p50), float(p95))
 
 
 @dataclass(frozen=True)

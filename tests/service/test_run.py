@@ -106,7 +106,7 @@ def test_a_wall_reaches_the_autopilot_in_metres_and_the_pilot_reads_that_obstacl
         assert scan.state[AHEAD] == SectorState.OBSTACLE
         assert scan.distance_m[AHEAD] == pytest.approx(WALL_M, rel=0.05)
         wait_until(lambda: "uavdepth: obstacles ON" in texts(run.link))
-        assert run.link.states[-1] is ServiceState.ACTIVE
+        wait_until(lambda: run.link.states[-1] is ServiceState.ACTIVE)
     assert run.link.closed
     assert texts(run.link)[-1] == "uavdepth OFF: stopped"
 
@@ -255,7 +255,7 @@ def test_the_autopilot_waits_for_no_ground_station(how: str, monkeypatch: pytest
     settings = make_settings("zenoh.enabled=true", f"zenoh.listen=['tcp/127.0.0.1:{free_port()}']")
     with running(settings=settings) as run:
         wait_until(lambda: len(run.link.sent) >= 10)
-        assert run.link.states[-1] is ServiceState.ACTIVE
+        wait_until(lambda: run.link.states[-1] is ServiceState.ACTIVE)
         release.set()
         wait_until(lambda: "ZeroDivisionError" in _publisher_detail(run.service))
 
