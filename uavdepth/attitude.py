@@ -25,5 +25,5 @@ class Attitude:
 
     @property
     def level_from_body(self) -> NDArray[np.float64]:
-        """(3, 3) rotation from body FRD into the level frame: x along the nose's horizontal direction, z down."""
+        """(3, 3) rotation from body FRD into the level frame: x horizontally along the nose, z down."""
         return rotation_zyx(self.roll_rad, self.pitch_rad, 0.0)
