@@ -1,0 +1,1 @@
+"""The autopilot link: endpoints, the MAVLink conversation, and the thread round it."""

@@ -156,6 +156,7 @@ class AutopilotLink:
                 self._session.line_opened(self._clock.now_ns())
             while not self._stop.is_set():
                 self._turn(transport)
+            self._turn(transport)  # the last words: a text or state that was set just before closing
         except OSError as error:
             with self._lock:
                 self._session.line_failed(_reason(error))

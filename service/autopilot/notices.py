@@ -3,6 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import IntEnum
+
+
+class Problem(IntEnum):
+    """What can be wrong with the link, the worst first."""
+
+    LINE = 1
+    SILENT = 2
+    MAVLINK1 = 3
+    STREAMS = 4
+    FOREIGN = 5
 
 
 @dataclass(frozen=True)
@@ -19,21 +30,21 @@ class Notice:
 
 
 class Notices:
-    """Collects notices. A problem has a key, is told once, and stands until it is over."""
+    """Collects notices. A problem is told once and stands until it is over."""
 
     def __init__(self) -> None:
-        self._standing: dict[str, str] = {}
+        self._standing: dict[Problem, str] = {}
         self._untold: list[Notice] = []
 
-    def problem(self, key: str, text: str) -> None:
+    def problem(self, problem: Problem, text: str) -> None:
         """A problem stands. Told once; a changed text only updates what stands."""
-        if key not in self._standing:
+        if problem not in self._standing:
             self._untold.append(Notice(True, text))
-        self._standing[key] = text
+        self._standing[problem] = text
 
-    def over(self, key: str) -> bool:
+    def over(self, problem: Problem) -> bool:
         """The problem is over; True if it stood."""
-        return self._standing.pop(key, None) is not None
+        return self._standing.pop(problem, None) is not None
 
     def news(self, text: str) -> None:
         """Something good or neutral happened."""
@@ -41,8 +52,8 @@ class Notices:
 
     @property
     def standing(self) -> str | None:
-        """The problem that has stood longest, or None."""
-        return next(iter(self._standing.values()), None)
+        """The worst problem that stands, or None."""
+        return self._standing[min(self._standing)] if self._standing else None
 
     def take(self) -> list[Notice]:
         """What has not been told yet."""

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from service.autopilot.framing import FrameReader, is_mavlink1
 from service.autopilot.link_status import LinkStatus
 from service.autopilot.motion_history import MotionLimits
-from service.autopilot.notices import Notice, Notices
+from service.autopilot.notices import Notice, Notices, Problem
 from service.autopilot.obstacle_gate import ObstacleGate, Refusal
 from service.autopilot.outbox import Outbox
 from service.autopilot.presence import Presence
@@ -83,7 +83,7 @@ class LinkSession:
         self._presence.restart()
         self._timesync.restart()
         self._streams.restart()
-        if self._notices.over("line"):
+        if self._notices.over(Problem.LINE):
             self._notices.news(f"autopilot line {self._settings.endpoint} is open")
 
     def line_failed(self, reason: str) -> None:
@@ -91,7 +91,9 @@ class LinkSession:
         if self._line_open:
             self._line_losses += 1
         self._line_open = False
-        self._notices.problem("line", f"autopilot line {self._settings.endpoint}: {reason}; trying again")
+        self._notices.problem(
+            Problem.LINE, f"autopilot line {self._settings.endpoint}: {reason}; trying again"
+        )
 
     @property
     def destination(self) -> Hashable:
@@ -154,7 +156,7 @@ class LinkSession:
         vehicle = self._learner.vehicle
         if hearing is Hearing.FOREIGN and vehicle is not None:
             self._notices.problem(
-                "foreign",
+                Problem.FOREIGN,
                 f"another autopilot is heard (system {heartbeat.get_srcSystem()}): listening to system "
                 f"{vehicle.system_id} only",
             )
@@ -175,9 +177,9 @@ class LinkSession:
     def _on_protocol(self, mavlink1: bool) -> None:
         self._mavlink1 = mavlink1
         if mavlink1:
-            self._notices.problem("mavlink1", _MAVLINK1_TEXT)
+            self._notices.problem(Problem.MAVLINK1, _MAVLINK1_TEXT)
         else:
-            self._notices.over("mavlink1")
+            self._notices.over(Problem.MAVLINK1)
 
     def _on_timesync(self, message: mavlink.MAVLink_timesync_message, arrival_ns: int) -> None:
         answer = self._timesync.answer(message, arrival_ns)
@@ -208,7 +210,7 @@ class LinkSession:
             self._outbox.put(request, now_ns + _SHORT_LIVED_NS)
         for text in self._texts.due(now_ns):
             self._outbox.put(text)
-        self._watch_streams(now_ns)
+        self._watch_streams()
 
     def take_output(self, now_ns: int) -> list[bytes]:
         """Frames to write now, in order."""
@@ -308,18 +310,19 @@ class LinkSession:
     def _watch_connection(self, now_ns: int) -> None:
         endpoint = self._settings.endpoint
         if self._is_connected(now_ns):
-            self._notices.over("silent")
+            self._notices.over(Problem.SILENT)
         elif now_ns - max(self._opened_ns, self._heard_ns or 0) > self._timeout_ns:
             if self._learner.vehicle is None:
-                self._notices.problem("silent", f"no autopilot's HEARTBEAT has come on {endpoint}")
+                self._notices.problem(Problem.SILENT, f"no autopilot's HEARTBEAT has come on {endpoint}")
             else:
-                self._notices.problem("silent", f"the autopilot has gone silent on {endpoint}")
+                self._notices.problem(Problem.SILENT, f"the autopilot has gone silent on {endpoint}")
 
-    def _watch_streams(self, now_ns: int) -> None:
+    def _watch_streams(self) -> None:
         refused = self._streams.refused()
         if not refused:
-            self._notices.over("streams")
+            self._notices.over(Problem.STREAMS)
             return
-        rates = self._streams.rates_hz(now_ns)
-        missing = ", ".join(f"{s.message} at {rates[s.message]:.0f} of {s.rate_hz:.0f} Hz" for s in refused)
-        self._notices.problem("streams", f"the autopilot sends less than asked for: {missing}")
+        missing = ", ".join(f"{stream.message} at {stream.rate_hz:g} Hz" for stream in refused)
+        self._notices.problem(
+            Problem.STREAMS, f"the autopilot does not send what it was asked for: {missing}"
+        )

@@ -8,7 +8,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -68,22 +68,30 @@ class Peer:
         self._thread.join()
 
     def _run(self) -> None:
-        start_s, beat = time.monotonic(), 0
+        self._start_s, turn = time.monotonic(), 0
         while not self._stop.is_set():
-            boot_ms = round((time.monotonic() - start_s) * 1000) + 5000
-            try:
-                if beat % 25 == 0:
-                    self._write(self._voice.heartbeat())
-                self._write(self._voice.attitude(boot_ms, roll=0.25))
-                for message in self._parser.parse_buffer(self._read()) or []:
-                    self.heard.append(message)
-                    if message.get_type() == "TIMESYNC" and message.tc1 == 0:
-                        answer = mavlink.MAVLink_timesync_message(boot_ms * 1_000_000, message.ts1)
-                        self._write(self._voice.pack(answer))
-            except OSError:
-                pass
-            beat += 1
-            self._stop.wait(0.02)
+            if turn % 500 == 0:
+                self._say(self._voice.heartbeat())
+            if turn % 10 == 0:
+                self._say(self._voice.attitude(self._boot_ms(), roll=0.25))
+            with suppress(OSError):
+                self._listen(self._read())
+            turn += 1
+            self._stop.wait(0.002)
+
+    def _listen(self, data: bytes) -> None:
+        for message in self._parser.parse_buffer(data) or []:
+            self.heard.append(message)
+            if message.get_type() == "TIMESYNC" and message.tc1 == 0:
+                answer = mavlink.MAVLink_timesync_message(self._boot_ms() * 1_000_000, message.ts1)
+                self._say(self._voice.pack(answer))
+
+    def _say(self, frame: bytes) -> None:
+        with suppress(OSError):  # the link may be closed by now
+            self._write(frame)
+
+    def _boot_ms(self) -> int:
+        return round((time.monotonic() - self._start_s) * 1000) + 5000
 
 
 def quiet_read(sock: socket.socket) -> Callable[[], bytes]:
@@ -259,6 +267,16 @@ def test_a_link_starts_once_and_closes_twice() -> None:
             link.start()
         link.close()
     assert not [thread for thread in threading.enumerate() if thread.name == "autopilot-link"]
+
+
+def test_the_last_words_before_closing_still_leave() -> None:
+    with link_to("udp:127.0.0.1:0") as link:
+        assert link.listen_port
+        with udp_peer(link.listen_port) as peer:
+            eventually(lambda: link.status().connected)
+            link.say(4, "stopped")
+            link.close()
+            eventually(lambda: [m.text for m in peer.of("STATUSTEXT")] == ["stopped"])
 
 
 def test_garbage_from_the_network_does_no_harm() -> None:

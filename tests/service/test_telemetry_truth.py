@@ -105,7 +105,7 @@ class AnsweringFlight:
 
     def __init__(self, flight: Recorded, jitter_ns: int) -> None:
         self._flight, self._jitter_ns, self._rng = flight, jitter_ns, np.random.default_rng(3)
-        self._voice, self._answered = Voice(), 0
+        self._voice, self._read = Voice(), 0
         self.talk = Conversation(flight.arrivals[0].at_ns)
 
     def arrivals(self) -> Iterator[Arrival]:
@@ -120,8 +120,9 @@ class AnsweringFlight:
                 yield Arrival(newest_ns, line.pop(0).data)
 
     def _answers(self) -> list[Arrival]:
-        requests = [m for _, m in self.talk.sent_of("TIMESYNC") if m.tc1 == 0][self._answered :]
-        self._answered += len(requests)
+        new = [message for _, message in self.talk.sent[self._read :]]
+        self._read += len(new)
+        requests = [message for message in new if message.get_type() == "TIMESYNC" and message.tc1 == 0]
         answers = []
         for request in requests:
             there_ns = request.ts1 + self._delay_ns()
