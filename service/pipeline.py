@@ -221,7 +221,7 @@ class Perception:
         estimate = None
         if telemetry.height_m is not None:
             estimate = self._scaler.estimate(seen, telemetry.attitude, telemetry.height_m)
-        scale = self._tracked(estimate, blank.captured_ns)
+        scale = self._tracked(estimate, blank.captured_ns, has_height=telemetry.height_m is not None)
         if scale is None:
             missing = Trouble.NO_HEIGHT if telemetry.height_m is None else Trouble.NO_GROUND
             return replace(blank, trouble=missing)
@@ -236,14 +236,22 @@ class Perception:
             return result.distrusted(Trouble.NO_DEPTH)
         return result
 
-    def _tracked(self, estimate: GroundScale | None, captured_ns: int) -> ScaleStatus | None:
-        """The scale to use for this picture, its ground's or one that is held."""
+    def _tracked(
+        self, estimate: GroundScale | None, captured_ns: int, *, has_height: bool
+    ) -> ScaleStatus | None:
+        """The scale to use for this picture, its ground's or one that is held.
+
+        A vehicle that stopped before a wall sees no ground, and silence would open ArduPilot's path into
+        the wall after 1 to 1.75 s (measured): so a scale is held long there, with a sigma that grows.
+        """
         if estimate is not None:
             self._ground_seen_ns = captured_ns
         scale = self._tracker.update(estimate, captured_ns)
         if scale is None:
             return None
         age_s = (captured_ns - self._ground_seen_ns) / 1e9
+        if not has_height and age_s > self._scan_settings.scale_hold_without_height_s:
+            return None
         return ScaleStatus(scale.factor, scale.relative_sigma, age_s)
 
     def _certain(self, depth: DepthMap) -> NDArray[np.float32]:

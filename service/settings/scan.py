@@ -50,11 +50,20 @@ class ScanSettings(Section):
         description="Relative standard deviation of the metric scale above which no distances are sent.",
     )
     scale_hold_s: float = Field(
+        default=30.0,
+        ge=0.0,
+        le=120.0,
+        title="Time that a scale is kept, seconds",
+        description="How long the last metric scale holds while the height is known but no ground is seen, "
+        "as close to a wall; its uncertainty grows meanwhile. After it nothing is sent, and ArduPilot takes "
+        "silence for a free path.",
+    )
+    scale_hold_without_height_s: float = Field(
         default=2.0,
         ge=0.0,
         le=30.0,
-        title="Time that a scale is kept, seconds",
-        description="How long the last metric scale holds when no ground is seen; after it nothing is sent.",
+        title="Time that a scale is kept without height, seconds",
+        description="The same while the rangefinder gives no height.",
     )
 
     @model_validator(mode="after")

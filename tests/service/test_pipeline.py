@@ -89,7 +89,9 @@ def test_doubt_silences_every_element_and_says_why(
 
 
 def test_a_scale_is_held_for_a_while_without_height_and_then_given_up() -> None:
-    perception = perception_of(FixedDepth(shrunk(wall_over_ground(CAMERA, 8.0))), "scan.scale_hold_s=1.0")
+    perception = perception_of(
+        FixedDepth(shrunk(wall_over_ground(CAMERA, 8.0))), "scan.scale_hold_without_height_s=1.0"
+    )
     assert perception.step(frame_at(10.0), FLYING).trusted
     blind = replace(FLYING, height_m=None)
     held = perception.step(frame_at(10.9), blind)
@@ -98,6 +100,20 @@ def test_a_scale_is_held_for_a_while_without_height_and_then_given_up() -> None:
     assert held.scale.age_s == pytest.approx(0.9)
     assert held.scan.distance_m[AHEAD] == pytest.approx(8.0, rel=0.05)
     assert perception.step(frame_at(11.1), blind).trouble is Trouble.NO_HEIGHT
+
+
+def test_before_a_wall_that_hides_the_ground_the_scale_is_held_long_and_its_doubt_grows() -> None:
+    model = FixedDepth(shrunk(wall_over_ground(CAMERA, 8.0)))
+    perception = perception_of(model, "scan.scale_hold_s=30.0")
+    first = perception.step(frame_at(10.0), FLYING)
+    model.depth_m = np.full_like(model.depth_m, 1.0)  # a wall at 4 m fills the picture
+    held = perception.step(frame_at(35.0), FLYING)
+    assert held.trusted
+    assert held.scan.distance_m[AHEAD] == pytest.approx(4.0, rel=0.05)
+    assert first.scale is not None
+    assert held.scale is not None
+    assert held.scale.relative_sigma > 2 * first.scale.relative_sigma
+    assert perception.step(frame_at(41.0), FLYING).trouble is Trouble.NO_GROUND
 
 
 def test_an_uncertain_scale_is_not_used() -> None:

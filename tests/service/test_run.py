@@ -156,7 +156,7 @@ def test_in_the_air_or_without_rangefinder_a_lack_of_height_is_silence(link_valu
 
 
 def test_losing_the_height_in_the_air_is_critical_and_its_return_is_told() -> None:
-    settings = make_settings("scan.scale_hold_s=0")
+    settings = make_settings("scan.scale_hold_without_height_s=0")
     with running(settings=settings) as run:
         wait_until(lambda: run.link.states[-1:] == [ServiceState.ACTIVE])
         run.link.height_m = None
