@@ -35,6 +35,7 @@ class Vitals:
         result_trouble: what was wrong with that one.
         sent_ns: when distances were sent last, None if never.
         armed_ns: when the vehicle was armed last, None if it was so from the start or never.
+        mavlink1: the autopilot speaks MAVLink 1, which has no OBSTACLE_DISTANCE.
     """
 
     now_ns: int
@@ -47,6 +48,7 @@ class Vitals:
     result_trouble: Trouble | None
     sent_ns: int | None
     armed_ns: int | None = None
+    mavlink1: bool = False
 
     @property
     def protected(self) -> bool:
@@ -62,6 +64,8 @@ def trouble_of(vitals: Vitals) -> Trouble | None:
         return Trouble.CAMERA_LOST
     if not vitals.link_connected:
         return Trouble.STARTING if vitals.sent_ns is None else Trouble.LINK_LOST
+    if vitals.mavlink1:
+        return Trouble.NOT_SENT
     if vitals.frame_ns is None and vitals.now_ns - vitals.started_ns > FIRST_FRAME_NS:
         return Trouble.CAMERA_LOST
     if vitals.frame_ns is not None and vitals.now_ns - vitals.frame_ns > STALL_NS:

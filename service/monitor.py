@@ -110,6 +110,7 @@ class Monitor:
             result_trouble=None if result is None else result.trouble,
             sent_ns=self._progress.sent_ns,
             armed_ns=self._note_arming(link.armed),
+            mavlink1=link.mavlink1_seen,
         )
         self.trouble = trouble_of(vitals)
         self.state = state_of(self.trouble, vitals)

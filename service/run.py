@@ -133,6 +133,13 @@ class Service:
         except UavDepthError:
             self.stop()
             raise
+        log.info(
+            "started",
+            vehicle=self._settings.vehicle.name,
+            camera=self._reader.camera_name,
+            autopilot=self._settings.autopilot.endpoint,
+            network=self._settings.model.path,
+        )
         self._thread.start()
         self._monitor.start()
 

@@ -52,6 +52,11 @@ class Camera(ABC):
         """The camera as the user wrote it, for messages."""
         return self.settings.source
 
+    @property
+    def granted(self) -> str:
+        """What the open device says it delivers, in words; empty where there is nothing to say."""
+        return ""
+
     @abstractmethod
     def open(self) -> None:
         """Start to deliver.

@@ -77,6 +77,11 @@ class CameraReader:
         return self._status
 
     @property
+    def camera_name(self) -> str:
+        """The camera, for messages."""
+        return self._camera.name
+
+    @property
     def failure(self) -> UavDepthError | None:
         """Why the camera can never work as configured, or None."""
         return self._failure
@@ -127,6 +132,8 @@ class CameraReader:
 
     def _open_and_deliver(self) -> None:
         self._camera.open()
+        if self._camera.granted:
+            log.info("camera open", camera=self._camera.name, delivers=self._camera.granted)
         while not self._stopping.is_set():
             try:
                 frame = self._camera.read(self._camera.settings.read_timeout_s)
@@ -135,7 +142,7 @@ class CameraReader:
                     return
                 if self._camera.reopen_on_timeout:
                     raise
-                self._report(str(error))
+                self._report(str(error), "camera waits")
                 self._show(CameraState.WAITING, str(error))
                 continue
             self._slot.put(frame)
@@ -158,10 +165,10 @@ class CameraReader:
         self._report(detail)
         self._show(CameraState.LOST, detail)
 
-    def _report(self, detail: str) -> None:
+    def _report(self, detail: str, what: str = "camera lost, tried again until it delivers") -> None:
         """Log a failure once, not at each of its repetitions."""
         if detail != self._reported and not self._stopping.is_set():
-            log.warning("camera lost, tried again until it delivers", reason=detail)
+            log.warning(what, reason=detail)
         self._reported = detail
 
     def _show(self, state: CameraState, detail: str) -> None:

@@ -44,9 +44,9 @@ class UsbCamera(Camera):
 
     @property
     def granted(self) -> str:
-        """What the open device says it delivers; cameras accept less than they say, so it is read back."""
+        # Cameras accept settings that they do not keep, so they are read back.
         if self._capture is None:
-            return "closed"
+            return ""
         width, height, fps = (
             self._capture.get(prop)
             for prop in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT, cv2.CAP_PROP_FPS)

@@ -37,4 +37,4 @@ def check(
     from service.settings.load import load_settings
 
     settings = load_settings(file, overrides or ())
-    typer.echo(f"{file}: valid; vehicle {settings.vehicle.name}, camera {settings.camera.source}")
+    typer.echo(f"{file}: valid, for vehicle {settings.vehicle.name}")

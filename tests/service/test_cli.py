@@ -267,8 +267,9 @@ def test_run_ends_cleanly_when_told_to(tmp_path: Path, number: signal.Signals) -
     config = write_config(tmp_path, "/dev/video63", more="[log]\nformat = 'json'\n")
     with started("run", "--config", str(config)) as process:
         assert process.stderr is not None
-        first = json.loads(process.stderr.readline())
-        assert "camera /dev/video63: no such device" in first["reason"]
+        lines = (json.loads(line) for line in process.stderr)
+        lost = next(line for line in lines if line["event"].startswith("camera lost"))
+        assert "camera /dev/video63: no such device" in lost["reason"]
         process.send_signal(number)
         _, rest = process.communicate(timeout=LIMIT_S)
     assert process.returncode == 0

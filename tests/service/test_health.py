@@ -72,6 +72,11 @@ def judged(vitals: Vitals) -> tuple[Trouble | None, ServiceState]:
             ServiceState.STANDBY,
         ),
         (SILENT, Trouble.NOT_SENT, ServiceState.CRITICAL),
+        (
+            replace(NEVER_SENT, result_trouble=Trouble.ON_GROUND, armed=False, mavlink1=True),
+            Trouble.NOT_SENT,
+            ServiceState.CRITICAL,
+        ),
         (replace(NEVER_SENT, result_ns=None), Trouble.STARTING, ServiceState.BOOT),
         (replace(NEVER_SENT, link_connected=False), Trouble.STARTING, ServiceState.BOOT),
         (replace(NEVER_SENT, frame_ns=None, result_ns=None, now_ns=1), Trouble.STARTING, ServiceState.BOOT),
