@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from uavdepth.scenes.mesh import MeshBuilder
-from uavdepth.scenes.solids import Point, Rect, add_box, add_slab, add_wall
+from uavdepth.scenes.solids import Point, Rect, add_box, add_boxes, add_slab, add_wall
 from uavdepth.scenes.textures_city import FACADE_CELL_M
 
 STYLES = ("brick_facade", "plaster_facade", "panel_facade", "glass_facade")
@@ -73,25 +73,13 @@ def _add_balconies(
     column = int(rng.integers(cells))
     turn = float(np.arctan2(along[1], along[0]))
     tint = rng.uniform(0.5, 1.1, 3)
-    for floor in range(1, floors):
-        place = np.array(start) + along * (column + 0.5) * FACADE_CELL_M
-        for side in (1.0, -1.0):
-            # One of the two lies inside the house, unseen: the ring's direction need not be known.
-            middle = place + side * outwards * 0.55
-            base = ground_m + floor * FACADE_CELL_M
-            centre = (float(middle[0]), float(middle[1]))
-            add_box(builder, centre, (2.2, 1.1), base, base + 0.15, "concrete", (1, 1, 1), turn)
-            front = place + side * outwards * 1.07
-            add_box(
-                builder,
-                (float(front[0]), float(front[1])),
-                (2.2, 0.06),
-                base + 0.15,
-                base + 1.1,
-                "paint",
-                tint,
-                turn,
-            )
+    place = np.array(start) + along * (column + 0.5) * FACADE_CELL_M
+    bases = ground_m + np.repeat(np.arange(1, floors), 2) * FACADE_CELL_M
+    # One of the two sides lies inside the house, unseen: the ring's direction need not be known.
+    sides = np.tile([1.0, -1.0], floors - 1)[:, None]
+    add_boxes(builder, place + sides * outwards * 0.55, (2.2, 1.1), bases, 0.15, "concrete", turn_rad=turn)
+    fronts = place + sides * outwards * 1.07
+    add_boxes(builder, fronts, (2.2, 0.06), bases + 0.15, 0.95, "paint", tint, turn)
 
 
 def _add_flat_roof(

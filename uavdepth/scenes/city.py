@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from uavdepth.scenes.buildings import add_house
+from uavdepth.scenes.cars import CarPark
 from uavdepth.scenes.copies import Template, add_copies
 from uavdepth.scenes.description import SceneDescription
 from uavdepth.scenes.mesh import MeshBuilder
 from uavdepth.scenes.solids import Rect, add_slab, add_wall
-from uavdepth.scenes.street_furniture import add_car, add_lamp, add_sign, add_small_thing
+from uavdepth.scenes.street_furniture import add_lamp, add_sign, add_small_thing
 from uavdepth.scenes.textures_city import FACADE_CELL_M
 from uavdepth.scenes.undergrowth import add_bush
 from uavdepth.scenes.vegetation import TreeKind, add_tree
@@ -50,6 +51,7 @@ class _Street:
 class _Town:
     rng: np.random.Generator
     builder: MeshBuilder
+    cars: CarPark
     trees: list[Template]
     greenery: float
     """Chance that a place for a tree has one."""
@@ -72,12 +74,22 @@ def build(seed: int) -> SceneDescription:
     autumn = float(rng.choice([0.0, 0.0, 0.3, 0.9]))
     templates = [_tree_template(rng, str(rng.choice(kinds)), autumn) for _ in range(4)]  # type: ignore[arg-type]
     floors = (low, low + int(rng.integers(1, 6)))
-    town = _Town(rng, builder, templates, rng.uniform(0.15, 0.9), rng.uniform(0.15, 0.85), floors, facade_m)
+    town = _Town(
+        rng,
+        builder,
+        CarPark(rng),
+        templates,
+        greenery=rng.uniform(0.15, 0.9),
+        parked=rng.uniform(0.15, 0.85),
+        floors=floors,
+        facade_north_m=facade_m,
+    )
     _add_ground(town)
     blocks = _blocks(easts, norths, facade_m)
     for block in blocks:
         _add_block(town, block)
     _add_roads(town, easts, norths, facade_m)
+    town.cars.build(builder)
     weather = draw_weather(rng, (0.0006, 0.008))
     return SceneDescription(
         mesh=builder.build(),
@@ -324,4 +336,4 @@ def _mark_and_park(town: _Town, axis: int, street: _Street, along_m: float) -> N
         if not _off_corridor(spot, 1.0) or (abs(spot[1]) < 9.0 and abs(spot[0] - town.facade_north_m) < 14.0):
             continue
         heading = (0.0 if axis == 1 else np.pi / 2) + (np.pi if rng.random() < 0.5 else 0.0)
-        add_car(town.builder, rng, *spot, 0.0, heading + rng.normal(0.0, 0.02))
+        town.cars.park(*spot, 0.0, heading + rng.normal(0.0, 0.02))

@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from uavdepth.scenes.mesh import MeshBuilder
 
 _QUAD = np.array([(0, 1, 2), (0, 2, 3)], np.int32)
+_NEXT = np.array([1, 2, 3, 0])
+_UNIT_RING = 0.5 * np.array([(-1, -1), (-1, 1), (1, 1), (1, -1)], float)
 
 Point = tuple[float, float]
 """North and east in metres."""
@@ -108,33 +110,54 @@ def add_box(
         top_texture: of the lid; None takes `texture`.
         taper: size of the lid as a part of the foot.
     """
-    foot = _ring(centre, size_m, turn_rad)
-    lid = _ring(centre, (size_m[0] * taper, size_m[1] * taper), turn_rad)
-    following = np.roll(np.arange(4), -1)
-    vertices = np.empty((4, 4, 3))
-    vertices[:, 0, :2], vertices[:, 1, :2] = lid, lid[following]
-    vertices[:, 2, :2], vertices[:, 3, :2] = foot[following], foot
-    vertices[:, :2, 2], vertices[:, 2:, 2] = -top_m, -bottom_m
-    length = np.hypot(*(foot[following] - foot).T)
+    add_boxes(
+        builder, [centre], size_m, [bottom_m], top_m - bottom_m, texture, tint, turn_rad, top_texture, taper
+    )
+
+
+def add_boxes(
+    builder: MeshBuilder,
+    centres: ArrayLike,
+    size_m: tuple[float, float],
+    bottoms_m: ArrayLike,
+    height_m: float,
+    texture: str,
+    tint: ArrayLike = (1.0, 1.0, 1.0),
+    turn_rad: float = 0.0,
+    top_texture: str | None = None,
+    taper: float = 1.0,
+) -> None:
+    """K equal boxes at (K, 2) places and (K,) heights of their feet; other arguments as in `add_box`."""
+    places = np.asarray(centres, float).reshape(-1, 1, 2)
+    bottoms = np.asarray(bottoms_m, float).reshape(-1, 1)
+    foot = _ring(size_m, turn_rad)
+    lid = foot * taper
+    sides = np.empty((len(places), 4, 4, 3))
+    sides[:, :, 0, :2], sides[:, :, 1, :2] = places + lid, places + lid[_NEXT]
+    sides[:, :, 2, :2], sides[:, :, 3, :2] = places + foot[_NEXT], places + foot
+    sides[..., :2, 2] = -(bottoms + height_m)[..., None]
+    sides[..., 2:, 2] = -bottoms[..., None]
     uv = np.zeros((4, 4, 2))
-    uv[:, 1:3, 0] = length[:, None]
-    uv[:, 2:, 1] = top_m - bottom_m
-    faces = (_QUAD[None] + 4 * np.arange(4, dtype=np.int32)[:, None, None]).reshape(-1, 3)
-    roof = np.column_stack([lid, np.full(4, -top_m)])
-    roof_uv = lid - np.asarray(centre)
-    if top_texture is None:
-        sides = vertices.reshape(-1, 3)
-        joined = np.concatenate([faces, _QUAD + 16])
-        builder.add(
-            np.concatenate([sides, roof]), joined, np.concatenate([uv.reshape(-1, 2), roof_uv]), texture, tint
-        )
-        return
-    builder.add(vertices.reshape(-1, 3), faces, uv.reshape(-1, 2), texture, tint)
-    builder.add(roof, _QUAD, roof_uv, top_texture, tint)
+    uv[:, 1:3, 0] = np.hypot(*(foot[_NEXT] - foot).T)[:, None]
+    uv[:, 2:, 1] = height_m
+    lids = np.empty((len(places), 1, 4, 3))
+    lids[..., :2] = (places + lid)[:, None]
+    lids[..., 2] = -(bottoms + height_m)[..., None]
+    _add_quads(builder, sides, uv, texture, tint)
+    _add_quads(builder, lids, lid[None], top_texture or texture, tint)
 
 
-def _ring(centre: Point, size_m: Sequence[float], turn_rad: float) -> NDArray[np.float64]:
-    half = 0.5 * np.array([(-1, -1), (-1, 1), (1, 1), (1, -1)], float) * np.asarray(size_m)
+def _add_quads(
+    builder: MeshBuilder, corners: NDArray[np.float64], uv: NDArray[np.float64], texture: str, tint: ArrayLike
+) -> None:
+    """(K, Q, 4, 3) corners of quads with (Q, 4, 2) texture coordinates that all K share."""
+    count = corners.shape[0] * corners.shape[1]
+    faces = _QUAD[None] + 4 * np.arange(count, dtype=np.int32)[:, None, None]
+    spread = np.broadcast_to(uv, (*corners.shape[:3], 2))
+    builder.add(corners.reshape(-1, 3), faces.reshape(-1, 3), spread.reshape(-1, 2), texture, tint)
+
+
+def _ring(size_m: Sequence[float], turn_rad: float) -> NDArray[np.float64]:
+    half = _UNIT_RING * np.asarray(size_m)
     cosine, sine = np.cos(turn_rad), np.sin(turn_rad)
-    turned = half @ np.array([[cosine, sine], [-sine, cosine]])
-    return np.asarray(turned + np.asarray(centre, float))
+    return np.asarray(half @ np.array([[cosine, sine], [-sine, cosine]]))

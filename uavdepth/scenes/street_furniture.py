@@ -1,4 +1,4 @@
-"""What stands in a street: cars, lamp posts, signs, bins, bollards."""
+"""What stands in a street: lamp posts, signs, bins, bollards, benches."""
 
 from __future__ import annotations
 
@@ -7,16 +7,6 @@ import numpy as np
 from uavdepth.scenes.mesh import MeshBuilder
 from uavdepth.scenes.shapes import tube
 from uavdepth.scenes.solids import add_box
-
-_CAR_COLORS_BGR = (
-    (1.1, 1.1, 1.1),
-    (0.25, 0.25, 0.27),
-    (0.55, 0.57, 0.6),
-    (0.25, 0.25, 0.95),
-    (0.85, 0.45, 0.2),
-    (0.35, 0.6, 0.3),
-    (0.3, 0.75, 1.0),
-)
 
 
 def _pole(
@@ -27,68 +17,6 @@ def _pole(
 ) -> None:
     (vertices, faces), uv = tube(line_m, [radius_m] * len(line_m), 8)
     builder.add(vertices, faces, uv, "paint", tint, smooth=True)
-
-
-def add_car(
-    builder: MeshBuilder,
-    rng: np.random.Generator,
-    north_m: float,
-    east_m: float,
-    ground_m: float,
-    heading_rad: float,
-) -> None:
-    """A parked car or van of true size, its length along `heading_rad`."""
-    color = np.array(_CAR_COLORS_BGR[int(rng.integers(len(_CAR_COLORS_BGR)))]) * rng.uniform(0.8, 1.0)
-    van = rng.random() < 0.18
-    length = rng.uniform(4.8, 5.6) if van else rng.uniform(3.7, 4.7)
-    width = rng.uniform(1.9, 2.0) if van else rng.uniform(1.68, 1.84)
-    forward = np.array([np.cos(heading_rad), np.sin(heading_rad)])
-    right = np.array([-forward[1], forward[0]])
-    middle = np.array([north_m, east_m])
-
-    def place(ahead_m: float, side_m: float = 0.0) -> tuple[float, float]:
-        north, east = middle + ahead_m * forward + side_m * right
-        return float(north), float(east)
-
-    body_top = ground_m + (1.05 if van else rng.uniform(0.78, 0.92))
-    add_box(builder, place(0), (length, width), ground_m + 0.28, body_top, "paint", color, heading_rad)
-    roof = ground_m + (rng.uniform(1.95, 2.3) if van else rng.uniform(1.4, 1.55))
-    cabin = (length * (0.92 if van else 0.6), width * 0.94)
-    back = -0.03 * length if van else -0.07 * length
-    taper = 0.92 if van else 0.78
-    add_box(
-        builder, place(back), cabin, body_top, roof - 0.06, "car_glass", (1, 1, 1), heading_rad, taper=taper
-    )
-    lid = (cabin[0] * taper + 0.04, cabin[1] * taper + 0.04)
-    add_box(builder, place(back), lid, roof - 0.07, roof, "paint", color, heading_rad)
-    for ahead in (0.31 * length, -0.31 * length):
-        for side in (0.5 * width - 0.1, -0.5 * width + 0.1):
-            hub = np.array([*place(ahead, side), -(ground_m + 0.31)])
-            axle = np.array([*(right * 0.1), 0.0])
-            (vertices, faces), uv = tube([hub - axle, hub, hub + axle], [0.31, 0.31, 0.31], 10)
-            builder.add(vertices, faces, uv, "rubber")
-            add_box(
-                builder,
-                place(ahead, side),
-                (0.36, 0.2),
-                ground_m + 0.13,
-                ground_m + 0.49,
-                "rubber",
-                (2, 2, 2),
-                heading_rad,
-            )
-    for end, tint in ((0.5, (2.6, 2.8, 2.8)), (-0.5, (0.4, 0.4, 3.0))):
-        for side in (0.36 * width, -0.36 * width):
-            add_box(
-                builder,
-                place(end * length, side),
-                (0.05, 0.3),
-                body_top - 0.3,
-                body_top - 0.14,
-                "rubber",
-                np.clip(tint, 0, 3),
-                heading_rad,
-            )
 
 
 def add_lamp(

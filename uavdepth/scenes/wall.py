@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from uavdepth.scenes.cars import CarPark
 from uavdepth.scenes.description import SceneDescription
 from uavdepth.scenes.mesh import MeshBuilder
 from uavdepth.scenes.solids import Rect, add_box, add_slab
-from uavdepth.scenes.street_furniture import add_car, add_lamp, add_sign, add_small_thing
+from uavdepth.scenes.street_furniture import add_lamp, add_sign, add_small_thing
 from uavdepth.scenes.undergrowth import add_bush
 from uavdepth.scenes.vegetation import add_tree
 from uavdepth.scenes.weather import draw_weather
@@ -63,6 +64,7 @@ def _flat(north_m: ArrayLike, east_m: ArrayLike) -> NDArray[np.float64]:
 
 def _add_things(builder: MeshBuilder, rng: np.random.Generator, wall_m: float) -> None:
     """Boxes, containers, poles, cars and trees beside the corridor and behind the start."""
+    cars = CarPark(rng)
     for _ in range(int(rng.integers(25, 60))):
         north, east = rng.uniform(-_HALF_M + 10, _HALF_M - 10, 2)
         in_corridor = -8.0 < north < wall_m + 1.0 and abs(east) < _CORRIDOR_M + 3.0
@@ -97,7 +99,7 @@ def _add_things(builder: MeshBuilder, rng: np.random.Generator, wall_m: float) -
             turn = rng.uniform(0, 2 * np.pi)
             add_lamp(builder, rng, north, east, 0.0, (float(np.cos(turn)), float(np.sin(turn))))
         elif kind == 3:
-            add_car(builder, rng, north, east, 0.0, rng.uniform(0, 2 * np.pi))
+            cars.park(north, east, 0.0, rng.uniform(0, 2 * np.pi))
         elif kind == 4:
             add_tree(builder, rng, north, east, 0.0, rng.uniform(4.0, 9.0))
         elif kind == 5:
@@ -105,3 +107,4 @@ def _add_things(builder: MeshBuilder, rng: np.random.Generator, wall_m: float) -
             add_small_thing(builder, rng, north + 1.5, east, 0.0)
         else:
             add_bush(builder, rng, north, east, 0.0, rng.uniform(0.8, 2.0))
+    cars.build(builder)
