@@ -72,16 +72,17 @@ def add_leaf_ball(
     vertices, faces = lumpy_sphere(rng, subdivisions, radii_m, 0.3, 0.09)
     height = -vertices[faces].mean(axis=1)[:, 2] / radii_m[2]
     shade = (0.86 + 0.16 * height) * rng.uniform(0.9, 1.1, len(faces))
-    builder.add(vertices + centre, faces, box_uv(vertices + centre, faces), "leaves", tint * shade[:, None])
+    uv = box_uv(vertices + centre, faces)
+    builder.add(vertices + centre, faces, uv, "leaves", tint * shade[:, None], smooth=True)
 
     directions = rng.normal(0.0, 1.0, (shards, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     size = np.clip(0.3 * min(radii_m), 0.12, 0.5)
-    root = directions * np.array(radii_m) * rng.uniform(0.5, 0.8, (shards, 1))
+    root = directions * np.array(radii_m) * rng.uniform(0.7, 0.85, (shards, 1))
     across = np.cross(directions, rng.normal(0.0, 1.0, (shards, 3)))
     across *= size / np.linalg.norm(across, axis=1, keepdims=True)
     tip = directions * (np.array(radii_m) + size * rng.uniform(0.3, 1.3, (shards, 1)))
     corners = np.stack([root - across, root + across, tip], axis=1).reshape(-1, 3) + centre
     triangles = np.arange(3 * shards).reshape(-1, 3)
     shade = rng.uniform(0.8, 1.2, (shards, 1))
-    builder.add(corners, triangles, box_uv(corners, triangles), "leaves", tint * shade)
+    builder.add(corners, triangles, box_uv(corners, triangles), "leaves", tint * shade, smooth=True)

@@ -24,7 +24,7 @@ def add_bush(
         side = rng.normal(0.0, 0.3 * height_m, 2)
         size = height_m * rng.uniform(0.4, 0.6)
         centre = np.array([north_m + side[0], east_m + side[1], ground_down_m - 0.7 * size])
-        add_leaf_ball(builder, rng, centre, (size, size, 0.8 * size), tint, 1, shards=24)
+        add_leaf_ball(builder, rng, centre, (size, size, 0.8 * size), tint, 1, shards=12)
 
 
 def add_tuft(builder: MeshBuilder, rng: np.random.Generator, height_m: float, texture: str = "grass") -> None:

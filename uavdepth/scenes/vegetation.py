@@ -48,7 +48,7 @@ def add_tree(
         add_trunk(builder, rng, foot, 0.6 * height_m, radius, "bark", sway=0.02)
         middle = foot - [0.0, 0.0, 0.58 * height_m]
         spread = height_m * rng.uniform(0.09, 0.13)
-        add_leaf_ball(builder, rng, middle, (spread, spread, 0.43 * height_m), tint, 2, shards=50)
+        add_leaf_ball(builder, rng, middle, (spread, spread, 0.43 * height_m), tint, 2, shards=26)
     else:
         slender = kind == "birch"
         _broadleaf(builder, rng, foot, height_m, radius, tint, slender)
@@ -75,10 +75,10 @@ def _broadleaf(
         tip = np.array([line[3, 0] + reach * np.cos(heading), line[3, 1] + reach * np.sin(heading), top])
         add_tube(builder, np.array([line[2], tip]), [0.45 * radius_m, 0.03], 4, bark, np.ones(3))
         size = spread * height_m * rng.uniform(0.15, 0.22)
-        add_leaf_ball(builder, rng, tip, (size, size, size * (1.1 if slender else 0.8)), tint, 1, shards=20)
+        add_leaf_ball(builder, rng, tip, (size, size, size * (1.1 if slender else 0.8)), tint, 1, shards=11)
     size = spread * height_m * rng.uniform(0.17, 0.22)
     rise = height_m * 0.2
-    add_leaf_ball(builder, rng, line[4] + [0, 0, 0.2 * rise], (size, size, rise), tint * 1.08, 1, shards=20)
+    add_leaf_ball(builder, rng, line[4] + [0, 0, 0.2 * rise], (size, size, rise), tint * 1.08, 1, shards=11)
 
 
 def _conifer(
