@@ -86,7 +86,7 @@ def _add_flat_roof(
     builder: MeshBuilder, rng: np.random.Generator, plot: Rect, top_m: float, blind: str, tint: np.ndarray
 ) -> None:
     corners = plot.corners
-    add_slab(builder, plot, top_m + 0.1, "gravel", (0.8, 0.8, 0.8))
+    add_slab(builder, plot, top_m + 0.12, "gravel", (0.8, 0.8, 0.8))
     inner = plot.shrunk(0.3).corners
     for ring in (corners, inner):
         for start, end in zip(ring, ring[1:] + ring[:1], strict=True):

@@ -116,7 +116,7 @@ class Scene:
 def _point(position_ned_m: ArrayLike) -> NDArray[np.float64]:
     point = np.asarray(position_ned_m, np.float64)
     if point.shape != (3,) or not np.all(np.isfinite(point)):
-        raise SceneError(f"position {position_ned_m} is not three finite numbers")
+        raise SceneError(f"position {position_ned_m!r} is not three finite numbers")
     return point
 
 

@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from uavdepth.scenes.mesh import MeshBuilder
 
 _QUAD = np.array([(0, 1, 2), (0, 2, 3)], np.int32)
+"""Level quads from south-west over south-east: wound to face up."""
+_UPRIGHT = _QUAD[:, ::-1]
+"""Walls whose feet run around a solid in the order of `Rect.corners`: wound to face outwards."""
 _NEXT = np.array([1, 2, 3, 0])
 _UNIT_RING = 0.5 * np.array([(-1, -1), (-1, 1), (1, 1), (1, -1)], float)
 
@@ -54,7 +57,7 @@ def add_wall(
     tint: ArrayLike = (1.0, 1.0, 1.0),
     shift_m: float = 0.0,
 ) -> None:
-    """An upright rectangle from `start` to `end`.
+    """An upright rectangle from `start` to `end`, facing right of that direction seen from above.
 
     Args:
         bottom_m, top_m: heights over down = 0, up positive.
@@ -73,7 +76,7 @@ def add_wall(
         (shift_m + length, top_m - bottom_m),
         (shift_m, top_m - bottom_m),
     ]
-    builder.add(vertices, _QUAD, uv, texture, tint)
+    builder.add(vertices, _UPRIGHT, uv, texture, tint)
 
 
 def add_slab(
@@ -143,16 +146,21 @@ def add_boxes(
     lids = np.empty((len(places), 1, 4, 3))
     lids[..., :2] = (places + lid)[:, None]
     lids[..., 2] = -(bottoms + height_m)[..., None]
-    _add_quads(builder, sides, uv, texture, tint)
-    _add_quads(builder, lids, lid[None], top_texture or texture, tint)
+    _add_quads(builder, sides, uv, _UPRIGHT, texture, tint)
+    _add_quads(builder, lids, lid[None], _QUAD, top_texture or texture, tint)
 
 
 def _add_quads(
-    builder: MeshBuilder, corners: NDArray[np.float64], uv: NDArray[np.float64], texture: str, tint: ArrayLike
+    builder: MeshBuilder,
+    corners: NDArray[np.float64],
+    uv: NDArray[np.float64],
+    winding: NDArray[np.int32],
+    texture: str,
+    tint: ArrayLike,
 ) -> None:
     """(K, Q, 4, 3) corners of quads with (Q, 4, 2) texture coordinates that all K share."""
     count = corners.shape[0] * corners.shape[1]
-    faces = _QUAD[None] + 4 * np.arange(count, dtype=np.int32)[:, None, None]
+    faces = winding[None] + 4 * np.arange(count, dtype=np.int32)[:, None, None]
     spread = np.broadcast_to(uv, (*corners.shape[:3], 2))
     builder.add(corners.reshape(-1, 3), faces.reshape(-1, 3), spread.reshape(-1, 2), texture, tint)
 

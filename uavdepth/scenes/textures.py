@@ -1,9 +1,8 @@
-"""All textures of the rendered worlds by name, painted once per process and variant."""
+"""All textures of the rendered worlds by name, in a few painted variants each."""
 
 from __future__ import annotations
 
 import zlib
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +10,7 @@ from numpy.typing import NDArray
 from uavdepth.errors import SceneError
 from uavdepth.scenes.description import TextureSource
 from uavdepth.scenes.textures_city import CITY_TEXTURES
-
-try:  # the nature set registers itself when its module is there
-    from uavdepth.scenes.textures_nature import NATURE_TEXTURES
-except ModuleNotFoundError:
-    NATURE_TEXTURES: dict[str, TextureSource] = {}  # type: ignore[no-redef]
+from uavdepth.scenes.textures_nature import NATURE_TEXTURES
 
 TEXTURES: dict[str, TextureSource] = CITY_TEXTURES | NATURE_TEXTURES
 
@@ -31,7 +26,6 @@ def texture_source(name: str) -> TextureSource:
         raise SceneError(f"no texture is called {name!r}; known: {', '.join(sorted(TEXTURES))}") from None
 
 
-@lru_cache(maxsize=256)
 def painted(name: str, variant: int) -> NDArray[np.uint8]:
     """(S, S, 4) uint8 BGR and gloss of one texture.
 

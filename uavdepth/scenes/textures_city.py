@@ -44,7 +44,7 @@ def _cracks(rng: np.random.Generator, count: int) -> Gray:
 def _asphalt(rng: np.random.Generator) -> NDArray[np.uint8]:
     """Rolled asphalt with patches, stains and cracks."""
     stones = rng.standard_normal((_SIZE, _SIZE)).astype(np.float32)
-    stones = cv2.GaussianBlur(stones, (3, 3), 0.8, borderType=cv2.BORDER_REFLECT_101)
+    stones = np.asarray(cv2.GaussianBlur(stones, (3, 3), 0.8, borderType=cv2.BORDER_REFLECT_101), np.float32)
     wear = fractal_noise(rng, _SIZE, 3, 5)
     picture = ramp(wear, [-2, 0, 2], [(66, 66, 66), (86, 85, 84), (112, 112, 110)])
     picture *= (1.0 + 0.22 * stones)[..., None]
@@ -283,7 +283,7 @@ def _corrugated(rng: np.random.Generator) -> NDArray[np.uint8]:
     color = np.array([(150, 130, 90), (120, 150, 110), (170, 172, 174), (90, 100, 170)][int(rng.integers(4))])
     x = np.arange(_SIZE, dtype=np.float32)
     ribs = np.clip(2.2 * np.sin(x * 2 * np.pi * 16 / _SIZE), -1, 1)
-    picture = _plain(tuple(color)) * (1.0 + 0.16 * ribs)[None, :, None]
+    picture = np.asarray(_plain(tuple(color)) * (1.0 + 0.16 * ribs)[None, :, None], np.float32)
     rust = np.clip(fractal_noise(rng, _SIZE, (3, 14), 5) - 0.9, 0, 1)
     picture = blend(picture, (48, 76, 120), 0.9 * rust)
     for y in range(20, _SIZE, 128):

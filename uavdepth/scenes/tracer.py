@@ -57,9 +57,7 @@ class RayTracer:
             face, result["u"], result["v"], np.where(face == _MISS, np.float32(np.inf), result["tfar"])
         )
 
-    def occluded(
-        self, origins_m: NDArray[np.float32], directions: NDArray[np.float32]
-    ) -> NDArray[np.bool_]:
+    def occluded(self, origins_m: NDArray[np.float32], directions: NDArray[np.float32]) -> NDArray[np.bool_]:
         """(N,) True where anything lies along the ray, at any distance. Arguments as for `nearest`."""
         if len(directions) == 0:
             return np.zeros(0, np.bool_)
