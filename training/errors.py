@@ -23,3 +23,7 @@ class CheckpointError(UavDepthError):
 
 class ExportError(UavDepthError):
     """An exported file whose output is not the network's."""
+
+
+class EvaluationError(UavDepthError, ValueError):
+    """An evaluation that cannot be made or read."""

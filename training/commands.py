@@ -1,0 +1,54 @@
+"""`uavdepth train`, `uavdepth evaluate` and `uavdepth export`.
+
+Heavy packages are imported when a command runs, so that its help is fast and `evaluate` needs no torch.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from training.errors import EvaluationError
+from training.extras import needs_extra
+
+DEFAULT_CHECKPOINT = Path("training_run/checkpoint.pt")
+DEFAULT_NAME = "lite0-fan-eca"
+
+
+def export(
+    output: Annotated[Path, typer.Argument(help="ONNX file to write.")],
+    checkpoint: Annotated[Path, typer.Option(help="Checkpoint of `uavdepth train`.")] = DEFAULT_CHECKPOINT,
+    name: Annotated[str, typer.Option(help="Name of the network, for status and records.")] = DEFAULT_NAME,
+    measured: Annotated[
+        Path | None,
+        typer.Option(help="Result of `uavdepth evaluate --json` whose errors go into the card."),
+    ] = None,
+) -> None:
+    """Write a trained network as ONNX with its card.
+
+    The file is checked against PyTorch before it takes its place.
+    """
+    with needs_extra("export", "train"):
+        from training.checkpoint import Checkpoint
+        from training.export import export_checkpoint
+
+    errors = _measured_errors(measured) if measured is not None else {}
+    card = export_checkpoint(Checkpoint.load(checkpoint), output, name, errors)
+    typer.echo(
+        f"{output}: {card.name}, {card.input_width}x{card.input_height}, "
+        f"{output.stat().st_size / 1e6:.1f} MB, checked against PyTorch"
+    )
+
+
+def _measured_errors(path: Path) -> dict[str, Any]:
+    """The part of an evaluation that belongs into a model card."""
+    try:
+        result = json.loads(path.read_text(encoding="utf-8"))
+        return dict(result["summary"])
+    except FileNotFoundError as error:
+        raise EvaluationError(f"no result of an evaluation at {path}") from error
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise EvaluationError(f"{path} is not a result of `uavdepth evaluate --json`: {error!r}") from error

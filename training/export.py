@@ -1,0 +1,188 @@
+"""From a checkpoint to the ONNX file that flies."""
+
+from __future__ import annotations
+
+import logging
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import onnx
+import torch
+from numpy.typing import NDArray
+from pydantic import JsonValue
+from torch import Tensor, nn
+
+from training.checkpoint import Checkpoint
+from training.errors import CheckpointError, ExportError
+from training.networks.depth_network import DepthNetwork
+from training.normalization import FOCAL_REFERENCE_PX, IMAGE_MEAN, IMAGE_STD, MAX_DEPTH_M
+from uavdepth.depth_model import DepthModel
+from uavdepth.model_card import CARD_METADATA_KEY, ModelCard
+
+OPSET = 18
+"""The first with the Pad and ReduceMean that PyTorch writes; ONNX Runtime knows it since 1.14 (2023)."""
+
+LARGEST_DIFFERENCE = 1e-3
+"""Of log inverse depth between PyTorch and ONNX Runtime: 0.1 % of depth."""
+
+LICENCE = "Apache-2.0"
+
+
+class _TwoOutputs(nn.Module):
+    """The network with its outputs as a plain tuple: ONNX knows no dataclasses."""
+
+    def __init__(self, network: DepthNetwork) -> None:
+        super().__init__()
+        self.network = network
+
+    def forward(self, image: Tensor) -> tuple[Tensor, Tensor]:
+        output = self.network(image)
+        return output.log_inverse_depth, output.log_sigma
+
+
+def export_checkpoint(
+    checkpoint: Checkpoint, path: Path, name: str, measured: Mapping[str, JsonValue] | None = None
+) -> ModelCard:
+    """Write the averaged weights of a run as an ONNX file with its card.
+
+    The input has the fixed size of the run's last phase. Normalisation of the picture is not part of the
+    graph, `DepthModel` does it as the card says. The file is read back with `DepthModel` and its output
+    compared with PyTorch's before it takes its place at `path`.
+
+    Args:
+        checkpoint: of the run.
+        path: the ONNX file to write; a failure leaves an old one whole.
+        name: of the network, for status and records.
+        measured: errors on frames it was not trained on, for the card.
+
+    Returns:
+        The card that was written.
+
+    Raises:
+        ExportError: the written network does not compute what PyTorch does.
+        CheckpointError: weights that do not fit the network.
+    """
+    card = make_card(checkpoint, name, measured or {})
+    network = _TwoOutputs(_averaged_network(checkpoint)).eval()
+    model = _to_onnx(network, card)
+    onnx.helper.set_model_props(model, {CARD_METADATA_KEY: card.to_json()})
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f".{path.name}.part.onnx")
+    try:
+        partial.write_bytes(model.SerializeToString())
+        _check_same_output(network, partial)
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+    return card
+
+
+def make_card(checkpoint: Checkpoint, name: str, measured: Mapping[str, JsonValue]) -> ModelCard:
+    """What the file will say about itself."""
+    size = checkpoint.settings.phases[-1]
+    return ModelCard(
+        card_version=1,
+        name=name,
+        input_width=size.width,
+        input_height=size.height,
+        mean=IMAGE_MEAN,
+        std=IMAGE_STD,
+        output="log_inverse_depth",
+        metric=True,
+        uncertainty=True,
+        focal_px=FOCAL_REFERENCE_PX,
+        max_depth_m=MAX_DEPTH_M,
+        training_data=(
+            f"{checkpoint.frames} rendered frames with exact depth of {checkpoint.worlds} worlds of "
+            f"uavdepth.scenes, {checkpoint.images} pictures shown; encoder EfficientNet-Lite0 from ImageNet "
+            "weights (Apache-2.0)"
+        ),
+        licence=LICENCE,
+        measured=dict(measured),
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+    )
+
+
+def _averaged_network(checkpoint: Checkpoint) -> DepthNetwork:
+    try:
+        return checkpoint.averaged_network()
+    except RuntimeError as error:
+        raise CheckpointError(f"the checkpoint's weights do not fit its network: {error}") from error
+
+
+def _to_onnx(network: _TwoOutputs, card: ModelCard) -> onnx.ModelProto:
+    """The graph, batch normalisations folded into the convolutions before them."""
+    picture = torch.zeros(1, 3, card.input_height, card.input_width)
+    with torch.no_grad(), _quiet_exporter():
+        program = torch.onnx.export(
+            network,
+            (picture,),
+            input_names=[card.input_name],
+            output_names=[card.output_name, card.uncertainty_name],
+            opset_version=OPSET,
+            dynamo=True,
+            verbose=False,
+        )
+    model = cast(onnx.ModelProto, cast(Any, program).model_proto)
+    _strip_traces(model)
+    onnx.checker.check_model(model)
+    return model
+
+
+@contextmanager
+def _quiet_exporter() -> Iterator[None]:
+    """The exporter warns about packages that are not needed and about its own deprecations."""
+    logger = logging.getLogger("torch.onnx")
+    level = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        logger.setLevel(level)
+
+
+def _strip_traces(model: onnx.ModelProto) -> None:
+    """Take out the source lines, with this machine's paths, that PyTorch notes at every node."""
+    del model.metadata_props[:]
+    del model.graph.metadata_props[:]
+    model.doc_string = model.graph.doc_string = ""
+    graph = model.graph
+    for item in (*graph.node, *graph.initializer, *graph.value_info, *graph.input, *graph.output):
+        del item.metadata_props[:]
+        item.doc_string = ""
+
+
+def _check_same_output(network: _TwoOutputs, path: Path) -> None:
+    """Compare ONNX Runtime with PyTorch on a smooth and on a noisy picture."""
+    import onnxruntime
+
+    card = DepthModel.load(path, provider="cpu").card
+    names = [card.output_name, card.uncertainty_name]
+    session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
+    for picture in _pictures(card):
+        with torch.no_grad():
+            wanted = network(torch.from_numpy(picture))
+        outputs = session.run(names, {card.input_name: picture})
+        for name, want, output in zip(
+            (card.output_name, card.uncertainty_name), wanted, outputs, strict=True
+        ):
+            difference = float(np.abs(want.numpy() - output).max())
+            if not difference <= LARGEST_DIFFERENCE:
+                raise ExportError(
+                    f"the exported output '{name}' differs from PyTorch's by {difference:.2g}, "
+                    f"at most {LARGEST_DIFFERENCE:g} is allowed"
+                )
+
+
+def _pictures(card: ModelCard) -> list[NDArray[np.float32]]:
+    shape = (1, 3, card.input_height, card.input_width)
+    noise = np.random.default_rng(0).normal(0.0, 1.0, shape).astype(np.float32)
+    slope = np.linspace(-1.0, 1.0, card.input_height, dtype=np.float32)[None, None, :, None]
+    return [noise, np.ascontiguousarray(np.broadcast_to(slope, shape))]
