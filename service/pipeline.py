@@ -25,6 +25,10 @@ from uavdepth.scale_tracker import ScaleTracker
 
 log = structlog.get_logger()
 
+METRIC_FACTORS = (0.4, 2.5)
+"""Ground that asks a network which is metric by itself for a larger correction is not the ground below:
+a valley floor or a roof (over a valley factors near 0.25 came out, each with a small sigma)."""
+
 
 class DepthSource(Protocol):
     """What tells depth from a picture, up to one factor."""
@@ -169,7 +173,8 @@ class Perception:
             below_m=scan.below_m,
             above_m=scan.above_m,
         )
-        return cls(settings, model, GroundScaler(camera, mount), scanner, model.card.max_depth_m)
+        scaler = GroundScaler(camera, mount, METRIC_FACTORS if model.card.metric else None)
+        return cls(settings, model, scaler, scanner, model.card.max_depth_m)
 
     @property
     def model_failures(self) -> int:

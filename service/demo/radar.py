@@ -41,9 +41,8 @@ def draw_radar(scan: ObstacleScan | None, size_px: int, ring_step_m: float = 5.0
         _label(picture, "no data", (centre[0], centre[1]), 1.2)
         return _shrink(picture, size_px)
     for bearing, distance, state in zip(scan.bearing_deg, scan.distance_m, scan.state, strict=True):
-        _draw_sector(
-            picture, centre, radius, float(bearing), float(distance), int(state), scan.max_distance_m
-        )
+        reach = float(distance) / scan.max_distance_m
+        _draw_sector(picture, centre, radius, float(bearing), reach, int(state))
     _hatch_unknown(picture)
     for ring_m in np.arange(ring_step_m, scan.max_distance_m + 0.1, ring_step_m):
         ring_px = int(radius * ring_m / scan.max_distance_m)
