@@ -6,7 +6,7 @@ import numpy as np
 
 from uavdepth.scenes.mesh import MeshBuilder
 from uavdepth.scenes.solids import Point, Rect, add_box, add_boxes, add_slab, add_wall
-from uavdepth.scenes.textures_city import FACADE_CELL_M
+from uavdepth.scenes.textures_facade import FACADE_CELL_M
 
 STYLES = ("brick_facade", "plaster_facade", "panel_facade", "glass_facade")
 _BLIND = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from uavdepth.scenes.buildings import add_house
 from uavdepth.scenes.cars import CarPark
@@ -14,14 +14,21 @@ from uavdepth.scenes.description import SceneDescription
 from uavdepth.scenes.mesh import MeshBuilder
 from uavdepth.scenes.solids import Rect, add_slab, add_wall
 from uavdepth.scenes.street_furniture import add_lamp, add_sign, add_small_thing
-from uavdepth.scenes.textures_city import FACADE_CELL_M
+from uavdepth.scenes.street_grid import (
+    KERB_M,
+    PAVEMENT_M,
+    REACH_M,
+    Street,
+    draw_blocks,
+    draw_street,
+    ground_height,
+    parallel_streets,
+)
+from uavdepth.scenes.textures_facade import FACADE_CELL_M
 from uavdepth.scenes.undergrowth import add_bush
 from uavdepth.scenes.vegetation import TreeKind, add_tree
 from uavdepth.scenes.weather import draw_weather
 
-KERB_M = 0.15
-_PAVEMENT_M = 4.0
-_REACH_M = 130.0
 _HORIZON_M = 900.0
 _CORRIDOR_M = 3.4
 """Nothing but the ground stands nearer than this to the straight line north of the origin."""
@@ -33,18 +40,6 @@ _TREES: tuple[tuple[TreeKind, ...], ...] = (
     ("conifer", "broadleaf"),
     ("dead", "conifer"),
 )
-
-
-@dataclass(frozen=True)
-class _Street:
-    """A street by its middle line and half the width of its road, metres."""
-
-    middle_m: float
-    half_road_m: float
-
-    @property
-    def half_width_m(self) -> float:
-        return self.half_road_m + _PAVEMENT_M
 
 
 @dataclass(frozen=True)
@@ -66,13 +61,13 @@ def build(seed: int) -> SceneDescription:
     rng = np.random.default_rng([seed, 0xC17])
     builder = MeshBuilder()
     facade_m = float(rng.uniform(33.0, 43.0))
-    cross = _street(rng)
-    easts = _along(rng, _Street(0.0, rng.uniform(5.0, 6.0)))
-    norths = _along(rng, _Street(facade_m - cross.half_width_m, cross.half_road_m))
+    cross = draw_street(rng)
+    easts = parallel_streets(rng, Street(0.0, rng.uniform(5.0, 6.0)))
+    norths = parallel_streets(rng, Street(facade_m - cross.half_width_m, cross.half_road_m))
     low = int(rng.integers(2, 6))
     kinds = _TREES[int(rng.integers(len(_TREES)))]
     autumn = float(rng.choice([0.0, 0.0, 0.3, 0.9]))
-    templates = [_tree_template(rng, str(rng.choice(kinds)), autumn) for _ in range(4)]  # type: ignore[arg-type]
+    templates = [_tree_template(rng, kinds[int(rng.integers(len(kinds)))], autumn) for _ in range(4)]
     floors = (low, low + int(rng.integers(1, 6)))
     town = _Town(
         rng,
@@ -85,7 +80,7 @@ def build(seed: int) -> SceneDescription:
         facade_north_m=facade_m,
     )
     _add_ground(town)
-    blocks = _blocks(easts, norths, facade_m)
+    blocks = draw_blocks(easts, norths, facade_m)
     for block in blocks:
         _add_block(town, block)
     _add_roads(town, easts, norths, facade_m)
@@ -93,7 +88,7 @@ def build(seed: int) -> SceneDescription:
     weather = draw_weather(rng, (0.0006, 0.008))
     return SceneDescription(
         mesh=builder.build(),
-        ground_height_m=_ground_height(blocks),
+        ground_height_m=ground_height(blocks),
         sun_direction_ned=weather.sun_direction_ned,
         sun_bgr=weather.sun_bgr,
         ambient_bgr=weather.ambient_bgr,
@@ -101,62 +96,13 @@ def build(seed: int) -> SceneDescription:
         sky_horizon_bgr=weather.sky_horizon_bgr,
         haze_per_m=weather.haze_per_m,
         cloud_amount=weather.cloud_amount,
-        extent_m=_REACH_M - 15.0,
+        extent_m=REACH_M - 15.0,
     )
-
-
-def _street(rng: np.random.Generator) -> _Street:
-    return _Street(0.0, float(rng.uniform(3.5, 6.5)))
-
-
-def _along(rng: np.random.Generator, first: _Street) -> list[_Street]:
-    """Streets on both sides of `first`, sorted, about 40 to 65 m apart."""
-    streets = [first]
-    for side in (-1.0, 1.0):
-        place = first.middle_m
-        while abs(place - first.middle_m) < _REACH_M - 40.0:
-            place += side * rng.uniform(42.0, 64.0)
-            streets.append(_Street(place, float(rng.uniform(3.5, 6.5))))
-    return sorted(streets, key=lambda street: street.middle_m)
-
-
-def _gaps(streets: list[_Street]) -> list[tuple[float, float]]:
-    """The stretches between streets, and the ones beyond the outermost."""
-    edges = [-_REACH_M - 60.0]
-    for street in streets:
-        edges += [street.middle_m - street.half_width_m, street.middle_m + street.half_width_m]
-    edges.append(_REACH_M + 60.0)
-    pairs = zip(edges[::2], edges[1::2], strict=True)
-    return [(low + _PAVEMENT_M, high - _PAVEMENT_M) for low, high in pairs if high - low > 16.0]
-
-
-def _blocks(easts: list[_Street], norths: list[_Street], facade_m: float) -> list[Rect]:
-    """Plots between the streets, without their pavements; north of the facade the street is built over."""
-    blocks = []
-    for north_low, north_high in _gaps(norths):
-        behind = abs(north_low - _PAVEMENT_M - facade_m) < 1.0
-        streets = [street for street in easts if not (behind and street.middle_m == 0.0)]
-        for east_low, east_high in _gaps(streets):
-            low = facade_m if behind else north_low
-            blocks.append(Rect(low, north_high, east_low, east_high))
-    return blocks
-
-
-def _ground_height(blocks: list[Rect]):  # type: ignore[no-untyped-def]
-    low = np.array([(b.north_low_m - _PAVEMENT_M, b.east_low_m - _PAVEMENT_M) for b in blocks])
-    high = np.array([(b.north_high_m + _PAVEMENT_M, b.east_high_m + _PAVEMENT_M) for b in blocks])
-
-    def height(north_m: ArrayLike, east_m: ArrayLike) -> NDArray[np.float64]:
-        place = np.stack(np.broadcast_arrays(north_m, east_m), axis=-1).astype(float)[..., None, :]
-        inside = ((place >= low) & (place <= high)).all(axis=-1).any(axis=-1)
-        return np.where(inside, KERB_M, 0.0)
-
-    return height
 
 
 def _add_ground(town: _Town) -> None:
     """Asphalt in slabs of changing shade, so that the plane is not one tone."""
-    lines = np.concatenate([[-_HORIZON_M], np.arange(-_REACH_M - 60, _REACH_M + 61, 14.0), [_HORIZON_M]])
+    lines = np.concatenate([[-_HORIZON_M], np.arange(-REACH_M - 60, REACH_M + 61, 14.0), [_HORIZON_M]])
     shade = town.rng.uniform(0.85, 1.1)
     for i in range(len(lines) - 1):
         for j in range(len(lines) - 1):
@@ -174,7 +120,7 @@ def _tree_template(rng: np.random.Generator, kind: TreeKind, autumn: float) -> T
 def _add_block(town: _Town, block: Rect) -> None:
     """Pavement, houses along the edges, a yard inside."""
     rng, builder = town.rng, town.builder
-    pavement = block.shrunk(-_PAVEMENT_M)
+    pavement = block.shrunk(-PAVEMENT_M)
     stone = str(rng.choice(["paving", "paving", "cobbles", "concrete"]))
     tint = np.full(3, rng.uniform(0.8, 1.08))
     ring = pavement.corners
@@ -271,7 +217,7 @@ def _furnish(town: _Town, pavement: Rect) -> None:
     for axis, line_m, low_m, high_m, outwards in edges:
         for number, along_m in enumerate(np.arange(low_m + 3.0, high_m - 2.0, 5.5)):
             place = (line_m, float(along_m)) if axis == 0 else (float(along_m), line_m)
-            if abs(place[0]) > _REACH_M or abs(place[1]) > _REACH_M or not _off_corridor(place, 1.2):
+            if abs(place[0]) > REACH_M or abs(place[1]) > REACH_M or not _off_corridor(place, 1.2):
                 continue
             if number % 4 == 0:
                 add_lamp(town.builder, rng, *place, KERB_M, outwards)
@@ -302,11 +248,11 @@ def _off_corridor(place: tuple[float, float], reach_m: float) -> bool:
     return not (-6.0 < north < 46.0 and abs(east) < _CORRIDOR_M + reach_m)
 
 
-def _add_roads(town: _Town, easts: list[_Street], norths: list[_Street], facade_m: float) -> None:
+def _add_roads(town: _Town, easts: list[Street], norths: list[Street], facade_m: float) -> None:
     """Lane markings and parked cars."""
     for axis, streets, others in ((1, easts, norths), (0, norths, easts)):
         for street in streets:
-            for along_m in np.arange(-_REACH_M, _REACH_M, 6.0):
+            for along_m in np.arange(-REACH_M, REACH_M, 6.0):
                 if (
                     axis == 1
                     and street.middle_m == 0.0
@@ -320,7 +266,7 @@ def _add_roads(town: _Town, easts: list[_Street], norths: list[_Street], facade_
                 _mark_and_park(town, axis, street, float(along_m))
 
 
-def _mark_and_park(town: _Town, axis: int, street: _Street, along_m: float) -> None:
+def _mark_and_park(town: _Town, axis: int, street: Street, along_m: float) -> None:
     rng = town.rng
 
     def place(side_m: float, ahead_m: float = 0.0) -> tuple[float, float]:

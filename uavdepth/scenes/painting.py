@@ -108,6 +108,29 @@ def scatter(
                 cv2.fillConvexPoly(picture, _fixed(here), tuple(map(float, color)), cv2.LINE_8, 4)
 
 
+def plain(size: int, color_bgr: ArrayLike) -> Picture:
+    """A (size, size) picture of one colour."""
+    return np.full((size, size, 3), color_bgr, np.float32)
+
+
+def cracks(rng: np.random.Generator, size: int, count: int) -> Gray:
+    """`count` wandering lines, 1 where a crack is and 0 elsewhere."""
+    lines = np.zeros((size, size), np.float32)
+    for _ in range(count):
+        point = rng.uniform(0, size, 2)
+        heading = rng.uniform(0, 2 * np.pi)
+        for _ in range(int(rng.integers(12, 40))):
+            heading += rng.normal(0.0, 0.45)
+            step = rng.uniform(5, 12)
+            end = point + step * np.array([np.cos(heading), np.sin(heading)])
+            for shift in ((0, 0), (size, 0), (-size, 0), (0, size), (0, -size)):
+                a = tuple(int(v) for v in point + shift)
+                b = tuple(int(v) for v in end + shift)
+                cv2.line(lines, a, b, 1.0, 1, cv2.LINE_AA)
+            point = end % size
+    return lines
+
+
 def finish(picture: Picture, rng: np.random.Generator, grain: float, hue: float = 0.05) -> NDArray[np.uint8]:
     """Add fine grain (deviation in grey levels) and this variant's own hue, and round to uint8."""
     size = len(picture)
