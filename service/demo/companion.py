@@ -42,6 +42,16 @@ class Companion:
             lines = self._log.read_text(errors="replace").splitlines()[-_LAST_LINES:]
             raise CompanionError(f"uavdepth run ended with exit code {code}: {' / '.join(lines)}")
 
+    @property
+    def peak_memory_mib(self) -> float:
+        """Largest resident memory so far in MiB, 0 where the system has no /proc."""
+        try:
+            lines = Path(f"/proc/{self._process.pid}/status").read_text().splitlines()
+        except OSError:
+            return 0.0
+        kib = [int(line.split()[1]) for line in lines if line.startswith("VmHWM:")]
+        return round(kib[0] / 1024, 1) if kib else 0.0
+
     def __enter__(self) -> Companion:
         return self
 

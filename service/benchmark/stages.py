@@ -1,0 +1,103 @@
+"""What one frame costs, step by step, in processor time of one core."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from service.benchmark.pictures import CAMERA, HEIGHT_M, LEVEL, MOUNT
+from service.frame import Frame
+from service.pipeline import METRIC_FACTORS, Perception
+from service.settings import Settings
+from service.telemetry import Telemetry
+from uavdepth.depth_codec import encode_depth_png
+from uavdepth.depth_model import DepthModel
+from uavdepth.ground_scale import GroundScaler
+from uavdepth.inference import InferenceSession, open_session
+from uavdepth.obstacle_message import encode_obstacle_distance
+from uavdepth.scanner import ObstacleScanner
+
+_WARM_UP = 3
+_NEAR_M, _FAR_M = 0.5, 60.0
+
+
+@dataclass(frozen=True)
+class StageTimes:
+    """Medians over the frames, milliseconds of processor time on one core at 640x320.
+
+    Args:
+        network: inference alone.
+        around_network: resize, normalise, depth of the output, to the camera's pixels.
+        ground_scale, scan, message: the other steps of the flight path.
+        all_but_network: one whole step of the pipeline with the message, less inference.
+        depth_png: the ground station's depth picture; made by the publisher, not on the flight path.
+    """
+
+    network: float
+    around_network: float
+    ground_scale: float
+    scan: float
+    message: float
+    all_but_network: float
+    depth_png: float
+
+
+class _Stopwatch:
+    """A session that notes the processor time of its last run."""
+
+    def __init__(self, session: Any) -> None:
+        self._session = session
+        self.last_ms = 0.0
+
+    def run(self, *arguments: Any) -> Any:
+        begun_ns = time.thread_time_ns()
+        outputs = self._session.run(*arguments)
+        self.last_ms = (time.thread_time_ns() - begun_ns) / 1e6
+        return outputs
+
+
+def measure_stages(model_name: str, pictures: list[NDArray[np.uint8]]) -> StageTimes:
+    """Measure every step on rendered pictures.
+
+    Args:
+        model_name: a network file, or the name of one that ships.
+        pictures: (320, 640, 3) uint8 BGR each.
+    """
+    cv2.setNumThreads(1)
+    loaded = DepthModel.load(model_name, "cpu", 1)
+    session = open_session(Path(loaded.source), "cpu", 1)
+    watch = _Stopwatch(session.session)
+    model = DepthModel(InferenceSession(watch, session.provider), loaded.card, loaded.source)
+    factors = METRIC_FACTORS if loaded.card.metric else None
+    scaler, scanner = GroundScaler(CAMERA, MOUNT, factors), ObstacleScanner(CAMERA, MOUNT)
+    settings = Settings.model_validate({"camera": {"source": "sim:city", "width": 640, "height": 320}})
+    perception = Perception(settings, model, scaler, scanner, loaded.card.max_depth_m)
+    rows = []
+    for number, picture in enumerate(pictures):
+        frame = Frame(picture, number, number)
+        telemetry = Telemetry(number, LEVEL, HEIGHT_M)
+        depth, infer_ms = _timed(partial(model.infer, picture, CAMERA))
+        network_ms = watch.last_ms
+        depth_m = depth.depth_m
+        _, scale_ms = _timed(partial(scaler.estimate, depth_m, LEVEL, HEIGHT_M))
+        scan, scan_ms = _timed(partial(scanner.scan, depth_m, LEVEL, HEIGHT_M))
+        _, message_ms = _timed(partial(encode_obstacle_distance, scan))
+        _, step_ms = _timed(partial(perception.step, frame, telemetry))
+        _, png_ms = _timed(partial(encode_depth_png, depth_m, _NEAR_M, _FAR_M))
+        rest_ms = step_ms - watch.last_ms + message_ms
+        rows.append((network_ms, infer_ms - network_ms, scale_ms, scan_ms, message_ms, rest_ms, png_ms))
+    return StageTimes(*(round(float(value), 2) for value in np.median(rows[_WARM_UP:], axis=0)))
+
+
+def _timed(step: Callable[[], Any]) -> tuple[Any, float]:
+    begun_ns = time.thread_time_ns()
+    result = step()
+    return result, (time.thread_time_ns() - begun_ns) / 1e6
