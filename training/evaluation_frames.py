@@ -1,0 +1,116 @@
+"""Frames to measure with: worlds that no network was trained on, rendered or read from a folder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from training.data.frame_store import FrameRecord, NewFrame, read_frames, write_frames
+from training.data.rendering import render_world
+from training.data.seed_split import SeedSplit
+from training.errors import EvaluationError
+from uavdepth.scenes import SCENE_NAMES, load_scene
+
+
+@dataclass(frozen=True)
+class EvaluationFrame:
+    """One frame and the world it shows."""
+
+    scene: str
+    seed: int
+    index: int
+    frame: NewFrame
+
+
+@dataclass(frozen=True)
+class EvaluationPlan:
+    """Which frames to measure with.
+
+    Args:
+        scenes: names of `uavdepth.scenes`.
+        seeds: of each scene; all kept for tests, or all kept for validation.
+        frames_per_seed: frames of each world.
+        store: folder where rendered frames are kept for the next time, or None.
+
+    Raises:
+        EvaluationError: an unknown scene, nothing to do, seeds of training, or seeds of two splits.
+        TrainingDataError: a seed outside all splits.
+    """
+
+    scenes: Sequence[str]
+    seeds: Sequence[int]
+    frames_per_seed: int
+    store: Path | None = None
+
+    def __post_init__(self) -> None:
+        for scene in self.scenes:
+            if scene not in SCENE_NAMES:
+                raise EvaluationError(f"no scene is called {scene!r}; there are {', '.join(SCENE_NAMES)}")
+        if not self.scenes or not self.seeds or self.frames_per_seed < 1:
+            raise EvaluationError(
+                f"{len(self.scenes)} scenes, {len(self.seeds)} seeds and {self.frames_per_seed} frames a "
+                "seed are given: at least one of each is needed"
+            )
+        splits = {SeedSplit.of(seed) for seed in self.seeds}
+        if SeedSplit.TRAIN in splits:
+            seen = next(seed for seed in self.seeds if SeedSplit.of(seed) is SeedSplit.TRAIN)
+            raise EvaluationError(
+                f"seed {seen} is for training: errors on it say nothing; validation begins at "
+                f"{SeedSplit.VALIDATION.value.start}, tests at {SeedSplit.TEST.value.start}"
+            )
+        if len(splits) > 1:
+            raise EvaluationError("seeds of validation and of tests are mixed: measure them apart")
+
+    @property
+    def split(self) -> SeedSplit:
+        """What the seeds are kept for."""
+        return SeedSplit.of(self.seeds[0])
+
+    @property
+    def frames_count(self) -> int:
+        """How many frames there are."""
+        return len(self.scenes) * len(self.seeds) * self.frames_per_seed
+
+    def frames(self) -> Iterator[EvaluationFrame]:
+        """The frames, world by world; what the store lacks is rendered.
+
+        Raises:
+            SceneError: a world that cannot be built.
+            TrainingDataError: a store that cannot be read.
+        """
+        stored = self._stored()
+        for seed in self.seeds:
+            for scene in self.scenes:
+                records = stored.get((scene, seed), [])
+                if len(records) >= self.frames_per_seed:
+                    frames = (_load(record) for record in records[: self.frames_per_seed])
+                    yield from _numbered(scene, seed, frames)
+                else:
+                    yield from _numbered(scene, seed, self._render(scene, seed))
+
+    def _stored(self) -> dict[tuple[str, int], list[FrameRecord]]:
+        stored: dict[tuple[str, int], list[FrameRecord]] = {}
+        if self.store is not None and self.store.exists():
+            for record in read_frames(self.store):
+                stored.setdefault((record.scene, record.seed), []).append(record)
+        return stored
+
+    def _render(self, scene: str, seed: int) -> Sequence[NewFrame]:
+        frames = render_world(load_scene(scene, seed), self.frames_per_seed)
+        if self.store is not None:
+            write_frames(self.store, scene, seed, frames)
+        return frames
+
+
+def _load(record: FrameRecord) -> NewFrame:
+    return NewFrame(
+        record.image_bgr(), record.depth_m(), record.camera, record.mount, record.attitude, record.height_m
+    )
+
+
+def _numbered(
+    scene: str, seed: int, frames: Iterator[NewFrame] | Sequence[NewFrame]
+) -> Iterator[EvaluationFrame]:
+    for index, frame in enumerate(frames):
+        yield EvaluationFrame(scene, seed, index, frame)
