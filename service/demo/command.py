@@ -52,8 +52,10 @@ def demo(
 
     plan = DemoPlan(scene, flavor.value, blind, speed, height, seconds, model)
     flight = DemoFlight(plan)
-    report = _run(flight, live=not (headless or as_json))
-    picture = _save(flight, output)
+    try:
+        report = _run(flight, live=not (headless or as_json))
+    finally:
+        picture = _save(flight, output)
     if as_json:
         typer.echo(json.dumps(asdict(report)))
     else:

@@ -72,6 +72,7 @@ class DemoFlight:
         scene = load_scene(*parse_scene(self.plan.scene))
         with ExitStack() as stack:
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="uavdepth-demo-")))
+            stack.callback(self._end, folder / "service.log")
             self.autopilot = stack.enter_context(
                 FakeAutopilot(
                     self.plan.flavor, "tcp:127.0.0.1:0", scene=scene, parameters=self.plan.parameters
@@ -80,12 +81,12 @@ class DemoFlight:
             companion = None if self.plan.blind else self._start_service(stack, folder)
             pilot = stack.enter_context(Pilot(self.autopilot.address))
             self._climb(pilot, companion)
-            try:
-                return self._fly(pilot, companion, scene)
-            finally:
-                self.phase = Phase.ENDED
-                log = folder / "service.log"
-                self.service_log = log.read_text(errors="replace") if log.exists() else ""
+            return self._fly(pilot, companion, scene)
+
+    def _end(self, log: Path) -> None:
+        """Keep the service's words; the folder that they lie in goes."""
+        self.phase = Phase.ENDED
+        self.service_log = log.read_text(errors="replace") if log.exists() else ""
 
     def _start_service(self, stack: ExitStack, folder: Path) -> Companion:
         self.phase = Phase.WAITING

@@ -62,10 +62,10 @@ name = "{VEHICLE}"
 
 [camera]
 source = "sim:{self.scene}"
-width = 384
-height = 240
+width = 320
+height = 200
 horizontal_fov_deg = 90.0
-fps = 20.0
+fps = 15.0
 
 [mount]
 pitch_deg = -10.0
