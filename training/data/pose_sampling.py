@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from uavdepth.attitude import Attitude
 
-FLIGHT_DURATION_S = 120.0
+FLIGHT_DURATION_S = 40.0
+_APPROACH_SPREAD_M = 20.0
 SAFE_CLEARANCE_M = 0.5
 APPROACH_SHARE = 0.45
 """Share of pictures taken right before an obstacle: a flight that keeps clear of them shows too few."""
@@ -74,10 +75,10 @@ def sample_poses(world: World, rng: np.random.Generator, count: int) -> list[Sam
 
 
 def _approach(world: World, rng: np.random.Generator, start: NDArray[np.float64]) -> SampledPose | None:
-    """A pose at a log-uniform distance before something that a level ray from near `start` meets."""
+    """A pose at a log-uniform distance before something that a level ray from around `start` meets."""
     for _ in range(_TRIES):
         heights = _HEIGHT_RANGES_M[rng.choice(len(_HEIGHT_RANGES_M), p=_HEIGHT_SHARES)]
-        north, east = start[:2] + rng.normal(0.0, 3.0, 2)
+        north, east = start[:2] + rng.normal(0.0, _APPROACH_SPREAD_M, 2)
         ground = float(world.ground_height_m(north, east))
         origin = np.array([north, east, -ground - rng.uniform(*heights)])
         yaw = rng.uniform(-math.pi, math.pi)
