@@ -15,11 +15,14 @@ import typer
 
 from training.errors import EvaluationError
 from training.extras import needs_extra
+from training.train_command import train
 
 if TYPE_CHECKING:
     from training.evaluation_frames import EvaluationFrame, EvaluationPlan
     from training.evaluation_report import EvaluationReport
     from training.evaluation_sheet import SheetRow
+
+__all__ = ["evaluate", "export", "train"]
 
 DEFAULT_CHECKPOINT = Path("training_run/checkpoint.pt")
 DEFAULT_NAME = "lite0-fan-eca"

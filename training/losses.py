@@ -7,7 +7,7 @@ overall scale of a picture is a constant added to e.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import torch
 from torch import Tensor
@@ -39,6 +39,10 @@ class LossTerms:
     edges: Tensor
     sigma: Tensor
     total: Tensor
+
+    def detached(self) -> LossTerms:
+        """The numbers alone: a log that keeps them must not keep what they were computed from."""
+        return LossTerms(*(getattr(self, field.name).detach() for field in fields(self)))
 
 
 def depth_loss(output: DepthOutput, batch: Batch, weights: LossWeights) -> LossTerms:

@@ -90,6 +90,11 @@ class Trainer:
         """Share of the run that is done."""
         return self.settings.progress(self.images, self.trained_s)
 
+    @property
+    def frames(self) -> int:
+        """Size of the training set."""
+        return len(self._pool)
+
     def run(self) -> Iterator[StepReport]:
         """Train to the end, one report a step."""
         self.network.train()
@@ -150,7 +155,7 @@ class Trainer:
         terms.total.backward()  # type: ignore[no-untyped-call]
         nn.utils.clip_grad_norm_(self.network.parameters(), self.settings.clip_norm)
         self._optimizer.step()
-        return terms
+        return terms.detached()
 
 
 def _optimizer(network: DepthNetwork, settings: TrainingSettings) -> torch.optim.Optimizer:

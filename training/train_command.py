@@ -1,0 +1,135 @@
+"""`uavdepth train`: renders what is missing of the training frames, then trains."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from training.errors import TrainingSettingsError
+from training.extras import needs_extra
+
+if TYPE_CHECKING:
+    from training.settings import TrainingSettings
+    from training.trainer import Trainer
+
+CHECKPOINT_NAME = "checkpoint.pt"
+LOG_NAME = "log.jsonl"
+DEFAULT_MINUTES = 60.0
+_SAVE_EVERY_S = 120.0
+
+
+def train(
+    data: Annotated[Path, typer.Option(help="Folder of rendered training frames.")] = Path("training_data"),
+    output: Annotated[Path, typer.Option(help="Folder of the run: checkpoint and log.")] = Path(
+        "training_run"
+    ),
+    render_seeds: Annotated[
+        int, typer.Option(min=0, max=900, help="Render worlds of seeds 0 to this many first, where missing.")
+    ] = 0,
+    scenes: Annotated[str, typer.Option(help="Scenes to render, by commas.")] = "city,mountain,forest,wall",
+    frames_per_seed: Annotated[int, typer.Option(min=1, help="Frames rendered of each world.")] = 24,
+    minutes: Annotated[
+        float | None,
+        typer.Option(help=f"Length of the run in minutes of training; {DEFAULT_MINUTES:g} if neither."),
+    ] = None,
+    images: Annotated[int | None, typer.Option(help="Length of the run in pictures shown.")] = None,
+    resume: Annotated[bool, typer.Option(help="Go on from the checkpoint in the run's folder.")] = False,
+    seed: Annotated[int, typer.Option(help="Seed of random weights and of the order of pictures.")] = 0,
+    precision: Annotated[str, typer.Option(help="auto, fp32 or bf16.")] = "auto",
+    threads: Annotated[int | None, typer.Option(min=1, help="Threads; every core if not given.")] = None,
+) -> None:
+    """Train the depth network on rendered flights with exact depth.
+
+    A run in minutes plans its learning rates by the clock, one in pictures is repeatable. Frames may be
+    added to the folder while the run goes on. Worlds kept for validation and tests are refused.
+    """
+    if render_seeds:
+        _render(data, scenes, render_seeds, frames_per_seed)
+    with needs_extra("train", "train"):
+        import cv2
+        import torch
+
+    cv2.setNumThreads(1)
+    if threads is not None:
+        torch.set_num_threads(threads)
+    trainer = _trainer(
+        data, output / CHECKPOINT_NAME, resume, _settings_maker(minutes, images, seed, precision)
+    )
+    _run(trainer, output)
+
+
+def _render(data: Path, scenes: str, seeds: int, frames_per_seed: int) -> None:
+    with needs_extra("train", "sim"):
+        from training.data.rendering import RenderPlan, render_plan
+        from training.data.seed_split import SeedSplit
+
+    names = tuple(name.strip() for name in scenes.split(",") if name.strip())
+    plan = RenderPlan(data, names, SeedSplit.TRAIN, 0, seeds, frames_per_seed)
+
+    def tell(scene: str, seed: int, frames: int) -> None:
+        typer.echo(f"rendered {frames} frames of {scene}:{seed}")
+
+    render_plan(plan, tell)
+
+
+SettingsMaker = Callable[["TrainingSettings | None"], "TrainingSettings"]
+
+
+def _settings_maker(minutes: float | None, images: int | None, seed: int, precision: str) -> SettingsMaker:
+    """How to get a run's settings, from those of its checkpoint if it goes on."""
+    if minutes is not None and images is not None:
+        raise TrainingSettingsError(f"--minutes {minutes:g} and --images {images}: a run has one length")
+
+    def make(previous: TrainingSettings | None) -> TrainingSettings:
+        from dataclasses import replace
+
+        from training.settings import TrainingSettings
+
+        if previous is None:
+            length = DEFAULT_MINUTES if minutes is None and images is None else minutes
+            return TrainingSettings(images=images, minutes=length, seed=seed, precision=precision)
+        if minutes is None and images is None:
+            return replace(previous, precision=precision)
+        return replace(previous, images=images, minutes=minutes, precision=precision)
+
+    return make
+
+
+def _trainer(data: Path, checkpoint: Path, resume: bool, settings: SettingsMaker) -> Trainer:
+    from training.checkpoint import Checkpoint
+    from training.data.batches import FramePool
+    from training.trainer import Trainer
+
+    if resume:
+        state = Checkpoint.load(checkpoint)
+        return Trainer.resume(state, FramePool(data), settings(state.settings))
+    if checkpoint.exists():
+        raise TrainingSettingsError(
+            f"{checkpoint} is there already: --resume goes on with it, --output names another folder"
+        )
+    return Trainer(settings(None), FramePool(data))
+
+
+def _run(trainer: Trainer, output: Path) -> None:
+    from training.run_log import RunLog
+
+    log = RunLog(output / LOG_NAME)
+    saved_s, images, before_s = trainer.trained_s, trainer.images, trainer.trained_s
+    try:
+        for report in trainer.run():
+            step_s, before_s = report.trained_s - before_s, report.trained_s
+            batch, images = report.images - images, report.images
+            summary = log.add(report, batch, step_s, trainer.frames)
+            if summary is not None:
+                typer.echo(summary.line())
+            if report.trained_s - saved_s > _SAVE_EVERY_S:
+                trainer.save(output / CHECKPOINT_NAME)
+                saved_s = report.trained_s
+    finally:
+        trainer.save(output / CHECKPOINT_NAME)
+    typer.echo(
+        f"{output / CHECKPOINT_NAME}: {trainer.images} pictures in {trainer.trained_s / 60:.1f} minutes"
+    )
