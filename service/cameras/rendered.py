@@ -10,6 +10,7 @@ from service.errors import CameraError
 from service.frame import Frame
 from service.settings.camera import CameraSettings
 from service.telemetry import Telemetry
+from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraMount
 
 if TYPE_CHECKING:
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
 
 _POLL_S = 0.005
 """How often a pose is looked for: far below the 20 ms between two poses of a 50 Hz stream."""
+
+_TAKE_OFF_NED_M = (0.0, 0.0, -1.0)
+"""A metre above the origin, which is free ground in every scene."""
 
 
 class PoseSource(Protocol):
@@ -58,7 +62,10 @@ class RenderedCamera(Camera):
         if self._scene is None:
             from uavdepth.scenes import load_scene, parse_scene
 
-            self._scene = load_scene(*parse_scene(self._spec))
+            scene = load_scene(*parse_scene(self._spec))
+            # The first picture loads the compiled shading, or compiles it: not while frames are awaited.
+            scene.render(self._model, self._mount, _TAKE_OFF_NED_M, Attitude(0.0, 0.0, 0.0))
+            self._scene = scene
         self._due_ns = self.clock.now_ns()
 
     def read(self, timeout_s: float) -> Frame:

@@ -24,7 +24,7 @@ from uavdepth.errors import UavDepthError
 from uavdepth.obstacle_scan import SectorState
 from uavdepth.scenes import load_scene, parse_scene
 
-SERVICE_TIMEOUT_S = 60.0
+SERVICE_TIMEOUT_S = 180.0
 """Longest wait for the first OBSTACLE_DISTANCE: the very first run compiles the renderer's shading."""
 
 REST_MPS = 0.4
@@ -39,7 +39,7 @@ class Phase(Enum):
     """Where the demo is."""
 
     BUILDING = "building the world"
-    WAITING = "waiting for the service"
+    WAITING = "waiting for the service (the very first run compiles the renderer)"
     CLIMBING = "taking off"
     FLYING = "flying north"
     ENDED = "ended"
