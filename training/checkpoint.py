@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,18 @@ from training.networks.depth_network import DepthNetwork, NetworkShape
 from training.settings import SizePhase, TrainingSettings
 
 FORMAT = 1
+
+_LOAD_ERRORS = (
+    KeyError,
+    TypeError,
+    AttributeError,
+    RuntimeError,
+    EOFError,
+    OSError,
+    ValueError,
+    pickle.UnpicklingError,
+)
+"""Whatever PyTorch and the settings raise for a file that is something else."""
 
 
 @dataclass
@@ -56,7 +69,9 @@ class Checkpoint:
             if content.pop("format") != FORMAT:
                 raise CheckpointError(f"{path} is not a checkpoint of format {FORMAT}")
             return cls(settings=_settings(content.pop("settings")), **content)
-        except (KeyError, TypeError, AttributeError, RuntimeError, EOFError, OSError, ValueError) as error:
+        except CheckpointError:
+            raise
+        except _LOAD_ERRORS as error:
             raise CheckpointError(f"{path} is not a checkpoint of this program: {error}") from error
 
     def averaged_network(self) -> DepthNetwork:

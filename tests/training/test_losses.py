@@ -1,0 +1,135 @@
+"""The loss: what it must not see, and what it must punish."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+import torch
+from torch import Tensor
+
+from training.data.batches import Batch
+from training.losses import (
+    LossWeights,
+    absolute_term,
+    depth_loss,
+    edge_term,
+    image_median,
+    masked_mean,
+    sigma_term,
+)
+from training.networks.depth_network import DepthOutput
+
+
+def batch_of(truth: Tensor, far: Tensor | None = None) -> Batch:
+    return Batch(
+        torch.zeros(len(truth), 3, 1, 1),
+        truth,
+        torch.zeros_like(truth, dtype=torch.bool) if far is None else far,
+    )
+
+
+@pytest.fixture
+def truth() -> Tensor:
+    return torch.randn(2, 1, 16, 24, generator=torch.Generator().manual_seed(1))
+
+
+def output_of(log_inverse_depth: Tensor) -> DepthOutput:
+    return DepthOutput(log_inverse_depth, torch.zeros_like(log_inverse_depth))
+
+
+def test_the_truth_itself_costs_nothing_but_the_sigma(truth: Tensor) -> None:
+    terms = depth_loss(output_of(truth.clone()), batch_of(truth), LossWeights())
+    assert float(terms.absolute) == float(terms.shape) == float(terms.edges) == 0.0
+
+
+def test_a_wrong_scale_of_the_whole_picture_costs_metres_only(truth: Tensor) -> None:
+    scale = torch.tensor([math.log(2.0), math.log(0.5)])[:, None, None, None]
+    terms = depth_loss(output_of(truth + scale), batch_of(truth), LossWeights())
+    assert float(terms.absolute) == pytest.approx(math.log(2.0), rel=1e-5)
+    assert float(terms.shape) == pytest.approx(0.0, abs=1e-6)
+    assert float(terms.edges) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_wrong_shape_costs_more_than_its_median_explains(truth: Tensor) -> None:
+    error = torch.zeros_like(truth)
+    error[..., :8, :] = 0.4
+    terms = depth_loss(output_of(truth + error), batch_of(truth), LossWeights())
+    assert float(terms.shape) > 0.1
+    assert float(terms.edges) > 0.0
+
+
+def test_sky_may_be_as_far_as_it_likes_but_not_near() -> None:
+    truth = torch.zeros(1, 1, 8, 8)
+    sky = torch.ones(1, 1, 8, 8, dtype=torch.bool)
+    sky[..., 4:, :] = False
+    farther, nearer = truth.clone(), truth.clone()
+    farther[sky], nearer[sky] = -3.0, 3.0
+    assert float(depth_loss(output_of(farther), batch_of(truth, sky), LossWeights()).absolute) == 0.0
+    assert float(depth_loss(output_of(nearer), batch_of(truth, sky), LossWeights()).absolute) > 0.1
+
+
+def test_sky_counts_less_by_its_weight() -> None:
+    error = torch.ones(1, 1, 1, 2)
+    near = torch.tensor([[[[True, False]]]])
+    error[..., 1] = 3.0
+    assert float(absolute_term(error, near, 0.5)) == pytest.approx((1.0 + 0.5 * 3.0) / 1.5)
+
+
+def test_edges_between_sky_and_the_world_are_left_to_the_other_terms() -> None:
+    error = torch.zeros(1, 1, 4, 16)
+    error[..., 8:] = 5.0
+    near = torch.ones_like(error, dtype=torch.bool)
+    assert float(edge_term(error, near)) > 0.1
+    near[..., 8:] = False
+    assert float(edge_term(error, near)) == 0.0
+
+
+def test_the_median_ignores_the_sky() -> None:
+    error = torch.full((1, 1, 10, 21), 0.25)
+    error[..., :5, :] = 9.0
+    near = torch.ones_like(error, dtype=torch.bool)
+    near[..., :5, :] = False
+    assert float(image_median(error, near)) == pytest.approx(0.25)
+
+
+def test_a_picture_of_sky_alone_has_a_finite_loss_and_gradient() -> None:
+    prediction = torch.zeros(1, 1, 8, 8, requires_grad=True)
+    sky = torch.ones(1, 1, 8, 8, dtype=torch.bool)
+    terms = depth_loss(output_of(prediction), batch_of(torch.full((1, 1, 8, 8), -5.0), sky), LossWeights())
+    terms.total.backward()  # type: ignore[no-untyped-call]
+    assert math.isfinite(float(terms.total.detach()))
+    assert prediction.grad is not None
+    assert bool(torch.isfinite(prediction.grad).all())
+
+
+def test_the_likeliest_sigma_is_that_of_the_error() -> None:
+    spread = 0.2
+    uniform = torch.rand(1, 1, 200, 200, generator=torch.Generator().manual_seed(2)) - 0.5
+    laplace = -spread * uniform.sign() * torch.log1p(-2 * uniform.abs())
+    near = torch.ones_like(laplace, dtype=torch.bool)
+    true_sigma = math.log(math.sqrt(2.0) * spread)
+    costs = {
+        shift: float(sigma_term(torch.full_like(laplace, true_sigma + shift), laplace, near))
+        for shift in (-0.3, 0.0, 0.3)
+    }
+    assert costs[0.0] < min(costs[-0.3], costs[0.3])
+
+
+def test_the_uncertainty_does_not_pull_at_the_depth(truth: Tensor) -> None:
+    prediction = (truth + 0.1 * torch.randn_like(truth)).requires_grad_()
+    sigma = torch.zeros_like(truth, requires_grad=True)
+    depth_loss(DepthOutput(prediction, sigma), batch_of(truth), LossWeights()).sigma.backward()  # type: ignore[no-untyped-call]
+    assert prediction.grad is None
+    assert sigma.grad is not None
+
+
+def test_the_mean_over_nothing_is_nothing() -> None:
+    assert float(masked_mean(torch.ones(3), torch.zeros(3, dtype=torch.bool))) == 0.0
+
+
+def test_logged_terms_keep_nothing_alive(truth: Tensor) -> None:
+    prediction = truth.clone().requires_grad_()
+    terms = depth_loss(output_of(prediction), batch_of(truth), LossWeights())
+    assert terms.total.requires_grad
+    assert not terms.detached().total.requires_grad

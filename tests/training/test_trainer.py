@@ -1,0 +1,226 @@
+"""The training run: its schedule, its average, and that it goes on from a checkpoint as if never stopped."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import torch
+import typer
+from frames import make_store
+from torch import nn
+from typer.testing import CliRunner
+
+import training.settings
+from training.averaging import AverageWeights
+from training.checkpoint import Checkpoint
+from training.data.batches import FramePool
+from training.errors import CheckpointError, TrainingSettingsError
+from training.networks.depth_network import NetworkShape
+from training.precision import autocast, resolve_precision
+from training.run_log import RunLog, read_log
+from training.settings import SizePhase, TrainingSettings
+from training.train_command import train
+from training.trainer import Trainer
+
+SMALL = NetworkShape(channels=(4, 4, 4, 4, 4), head_channels=4, frozen_stages=6)
+PHASES = (SizePhase(0.5, 64, 64, 2), SizePhase(1.0, 96, 64, 2))
+
+
+def settings(images: int = 12) -> TrainingSettings:
+    return TrainingSettings(images=images, phases=PHASES, shape=SMALL, precision="fp32")
+
+
+@pytest.fixture
+def pool(tmp_path: Path) -> FramePool:
+    return FramePool(make_store(tmp_path / "frames"))
+
+
+def run_to_end(trainer: Trainer) -> list[float]:
+    return [float(report.terms.total) for report in trainer.run()]
+
+
+def test_a_run_ends_after_the_pictures_it_was_given(pool: FramePool) -> None:
+    trainer = Trainer(settings(), pool, pretrained=False)
+    assert len(run_to_end(trainer)) == 6
+    assert (trainer.step, trainer.images, trainer.progress) == (6, 12, 1.0)
+
+
+def test_a_resumed_run_continues_exactly(pool: FramePool, tmp_path: Path) -> None:
+    whole = Trainer(settings(), pool, pretrained=False)
+    wanted = run_to_end(whole)
+
+    stopped = Trainer(settings(), pool, pretrained=False)
+    steps = stopped.run()
+    first = [float(next(steps).terms.total) for _ in range(2)]
+    stopped.save(tmp_path / "checkpoint.pt")
+    steps.close()  # type: ignore[attr-defined]
+
+    resumed = Trainer.resume(Checkpoint.load(tmp_path / "checkpoint.pt"), pool)
+    assert first + run_to_end(resumed) == wanted
+    for name, value in whole.network.state_dict().items():
+        assert torch.equal(value, resumed.network.state_dict()[name]), name
+    for name, value in whole.checkpoint().average.items():
+        assert torch.equal(value, resumed.checkpoint().average[name]), name
+
+
+def test_training_learns_the_painted_ground(pool: FramePool) -> None:
+    trainer = Trainer(settings(images=40), pool, pretrained=False)
+    losses = run_to_end(trainer)
+    assert sum(losses[-5:]) < 0.9 * sum(losses[:5])
+
+
+def test_a_run_in_minutes_ends_by_its_clock(pool: FramePool) -> None:
+    seconds = iter(range(0, 10_000, 20))
+    run = TrainingSettings(minutes=1.0, phases=PHASES, shape=SMALL, precision="fp32")
+    trainer = Trainer(run, pool, pretrained=False, seconds=lambda: float(next(seconds)))
+    assert len(run_to_end(trainer)) == 3
+
+
+def test_rates_rise_then_fall() -> None:
+    run = settings()
+    rates = [run.rate_factor(progress / 100) for progress in range(101)]
+    top = rates.index(max(rates))
+    assert max(rates) == pytest.approx(1.0)
+    assert rates[: top + 1] == sorted(rates[: top + 1])
+    assert rates[top:] == sorted(rates[top:], reverse=True)
+    assert rates[-1] == pytest.approx(run.final_rate)
+
+
+def test_pictures_grow_at_the_end_of_a_phase() -> None:
+    run = settings()
+    assert [run.phase_at(progress).width for progress in (0.0, 0.49, 0.5, 1.0)] == [64, 64, 96, 96]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        ({}, "give one of the two"),
+        ({"images": 4, "minutes": 1.0}, "give one of the two"),
+        ({"minutes": 0.0}, "above 0"),
+        ({"minutes": float("nan")}, "above 0"),
+        ({"images": 4, "phases": ()}, "rising numbers"),
+        ({"images": 4, "phases": (SizePhase(0.5, 64, 64, 2),)}, "rising numbers"),
+    ],
+)
+def test_settings_that_make_no_run_are_refused(arguments: dict[str, object], complaint: str) -> None:
+    with pytest.raises(TrainingSettingsError, match=complaint):
+        TrainingSettings(**arguments)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("size", "batch"), [((100, 64), 2), ((64, 33), 2), ((64, 64), 1)])
+def test_sizes_that_the_network_cannot_take_are_refused(size: tuple[int, int], batch: int) -> None:
+    with pytest.raises(TrainingSettingsError):
+        SizePhase(1.0, *size, batch)
+
+
+def test_the_average_lags_behind_the_weights_and_forgets_the_start() -> None:
+    layer = nn.Linear(1, 1, bias=False)
+    nn.init.zeros_(layer.weight)
+    average = AverageWeights(layer, decay=0.5)
+    nn.init.ones_(layer.weight)
+    average.update(layer, step=1000)
+    assert float(average.state["weight"]) == pytest.approx(0.5)
+    for _ in range(20):
+        average.update(layer, step=1000)
+    assert float(average.state["weight"]) == pytest.approx(1.0, abs=1e-4)
+
+
+def test_early_steps_count_more_in_the_average() -> None:
+    layer = nn.Linear(1, 1, bias=False)
+    nn.init.zeros_(layer.weight)
+    average = AverageWeights(layer, decay=0.999)
+    nn.init.ones_(layer.weight)
+    average.update(layer, step=1)
+    assert float(average.state["weight"]) > 0.8
+
+
+def test_a_checkpoint_survives_a_crash_while_it_is_written(pool: FramePool, tmp_path: Path) -> None:
+    trainer = Trainer(settings(), pool, pretrained=False)
+    path = tmp_path / "run" / "checkpoint.pt"
+    trainer.save(path)
+    (path.parent / "checkpoint.pt.part").write_bytes(b"half of it")
+    assert Checkpoint.load(path).settings == trainer.settings
+
+
+def test_a_missing_checkpoint_is_named(tmp_path: Path) -> None:
+    with pytest.raises(CheckpointError, match=r"none\.pt"):
+        Checkpoint.load(tmp_path / "none.pt")
+
+
+@pytest.mark.parametrize("content", [b"", b"not a checkpoint"])
+def test_a_broken_checkpoint_is_named(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "broken.pt"
+    path.write_bytes(content)
+    with pytest.raises(CheckpointError, match=r"broken\.pt"):
+        Checkpoint.load(path)
+
+
+def test_a_file_of_something_else_is_not_a_checkpoint(tmp_path: Path) -> None:
+    path = tmp_path / "other.pt"
+    torch.save({"weights": torch.zeros(2)}, path)
+    with pytest.raises(CheckpointError, match=r"other\.pt"):
+        Checkpoint.load(path)
+
+
+@pytest.mark.parametrize(
+    ("capabilities", "precision"),
+    [
+        ({"amx_bf16": True}, "bf16"),
+        ({"avx512_bf16": True}, "bf16"),
+        ({"avx512_bf16": False}, "fp32"),
+        ({}, "fp32"),
+    ],
+)
+def test_bf16_is_used_only_where_the_processor_computes_it(
+    monkeypatch: pytest.MonkeyPatch, capabilities: dict[str, bool], precision: str
+) -> None:
+    monkeypatch.setattr(torch.cpu, "get_capabilities", lambda: capabilities)
+    assert resolve_precision("auto") == precision
+
+
+def test_a_wanted_precision_is_taken_and_an_unknown_one_refused() -> None:
+    assert resolve_precision("bf16") == "bf16"
+    with autocast("bf16"):
+        assert (torch.ones(2, 2) @ torch.ones(2, 2)).dtype is torch.bfloat16
+    with pytest.raises(TrainingSettingsError, match="fp8"):
+        resolve_precision("fp8")
+
+
+def test_the_log_tells_means_and_can_be_read_back(pool: FramePool, tmp_path: Path) -> None:
+    log = RunLog(tmp_path / "log.jsonl", every_s=1e9)
+    reports = list(Trainer(settings(), pool, pretrained=False).run())
+    summaries = [log.add(report, 2, 0.0, len(pool)) for report in reports]
+    assert summaries[:-1] == [None] * (len(reports) - 1)
+    last = summaries[-1]
+    assert last is not None
+    assert last.total == pytest.approx(sum(float(r.terms.total) for r in reports) / len(reports), rel=1e-5)
+    assert read_log(tmp_path / "log.jsonl") == [last]
+    assert "100.0 %" in last.line()
+
+
+def test_the_command_trains_and_refuses_to_overwrite(
+    pool: FramePool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def small(**arguments: object) -> TrainingSettings:
+        return TrainingSettings(**arguments, phases=PHASES, shape=SMALL)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(training.settings, "TrainingSettings", small)
+    app = typer.Typer()
+    app.command()(train)
+    words = ["--data", str(tmp_path / "frames"), "--output", str(tmp_path / "run"), "--images", "8"]
+    done = CliRunner().invoke(app, words, catch_exceptions=False)
+    assert done.exit_code == 0
+    assert Checkpoint.load(tmp_path / "run" / "checkpoint.pt").images == 8
+    assert json.loads((tmp_path / "run" / "log.jsonl").read_text())["images"] == 8
+    with pytest.raises(TrainingSettingsError, match="--resume"):
+        CliRunner().invoke(app, words, catch_exceptions=False)
+    longer = [*words[:-1], "12", "--resume"]
+    assert CliRunner().invoke(app, longer, catch_exceptions=False).exit_code == 0
+    assert Checkpoint.load(tmp_path / "run" / "checkpoint.pt").images == 12
+
+
+def test_a_run_has_one_length(tmp_path: Path) -> None:
+    with pytest.raises(TrainingSettingsError, match="one length"):
+        train(data=tmp_path, output=tmp_path, render_seeds=0, minutes=1.0, images=5)
