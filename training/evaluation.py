@@ -16,7 +16,6 @@ from training.metrics import DepthMetrics, depth_metrics, median_factor
 from uavdepth.depth_model import DepthModel
 from uavdepth.ground_scale import GroundScaler
 
-
 PLAUSIBLE_FACTORS = (0.4, 2.5)
 """Corrections by the ground that are believed of a metric network, as in flight."""
 
