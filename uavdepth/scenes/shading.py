@@ -1,4 +1,7 @@
-"""Colour of ray hits: texture, sun, sky light, haze. Numba kernels on flat arrays, one thread, no GIL."""
+"""Colour of ray hits: texture, sun, sky light, haze. Numba kernels on flat arrays, one thread, no GIL.
+
+Numba's cache on disk watches this file only: after a change in `sky` or `texture_filter`, touch it.
+"""
 
 from __future__ import annotations
 
