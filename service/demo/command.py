@@ -19,7 +19,7 @@ DEFAULT_SCENE = "city:1003"
 """Seeds from 1000 on are kept from training (`training.data.split`)."""
 
 _REFRESH_S = 0.2
-_PICTURE_NEAR_M, _PICTURE_FAR_M = 1.0, 60.0
+_PICTURE_NEAR_M, _PICTURE_FAR_M = 1.5, 50.0
 
 
 class DemoFlavor(StrEnum):
@@ -109,19 +109,33 @@ def _save(flight: DemoFlight, output: Path) -> Path | None:
     output.mkdir(parents=True, exist_ok=True)
     if flight.service_log:
         (output / "service.log").write_text(flight.service_log, encoding="utf-8")
-    if flight.pictures is None:
+    moments = [
+        (moment, caption)
+        for moment, caption in (
+            (flight.on_the_way, "camera, on the way"),
+            (flight.at_the_end, "camera, at the end"),
+        )
+        if moment is not None
+    ]
+    if not moments:
         return None
     import cv2
+    import numpy as np
 
     from service.demo.picture import draw_side_by_side
 
-    picture = draw_side_by_side(
-        flight.pictures.image_bgr,
-        flight.pictures.depth_m,
-        None if flight.scan is None else flight.scan.scan,
-        _PICTURE_NEAR_M,
-        _PICTURE_FAR_M,
-    )
+    rows = [
+        draw_side_by_side(
+            moment.pictures.image_bgr,
+            moment.pictures.depth_m,
+            moment.scan.scan,
+            _PICTURE_NEAR_M,
+            _PICTURE_FAR_M,
+            caption,
+        )
+        for moment, caption in moments
+    ]
+    picture = np.vstack(rows)
     path = output / "demo.png"
     path.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
     return path

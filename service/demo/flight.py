@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
@@ -32,6 +33,9 @@ REST_S = 3.0
 """The vehicle has stopped when it was slower than this for so long; backing away counts as coming to rest."""
 
 FLEW_SHARE = 0.5
+ON_THE_WAY_M = 14.0
+"""The first picture is kept when the scan shows something ahead nearer than this."""
+
 _POLL_S = 0.05
 
 
@@ -45,6 +49,14 @@ class Phase(Enum):
     ENDED = "ended"
 
 
+@dataclass(frozen=True)
+class Moment:
+    """What the ground saw at one moment."""
+
+    pictures: Pictures
+    scan: ScanSample
+
+
 class DemoFlight:
     """One flight of the demo. `run` blocks; the other members may be read from other threads meanwhile."""
 
@@ -53,8 +65,8 @@ class DemoFlight:
         self.phase = Phase.BUILDING
         self.observer: GroundObserver | None = None
         self.autopilot: FakeAutopilot | None = None
-        self.pictures: Pictures | None = None
-        self.scan: ScanSample | None = None
+        self.on_the_way: Moment | None = None
+        self.at_the_end: Moment | None = None
         self.service_log = ""
         self._abandoned = threading.Event()
 
@@ -127,6 +139,7 @@ class DemoFlight:
                 break
             if companion is not None:
                 companion.check()
+            self._keep_moment()
             truth = self._autopilot.truth()
             speed_mps = math.hypot(*truth.velocity_ned_mps[:2])
             flew = flew or speed_mps >= FLEW_SHARE * self.plan.speed_mps
@@ -145,14 +158,14 @@ class DemoFlight:
     ) -> DemoReport:
         observer = self.observer
         status = None if observer is None else observer.status
-        self.scan = None if observer is None else observer.scan
-        self.pictures = None if observer is None else observer.pictures()
+        scan = None if observer is None else observer.scan
+        self.at_the_end = None if observer is None else _moment(observer)
         flown_s = max(end.time_s - start.time_s, 1e-6)
         return DemoReport(
             scene=self.plan.scene,
             flavor=self.plan.flavor,
             blind=self.plan.blind,
-            frames=0 if self.scan is None else self.scan.index + 1,
+            frames=0 if scan is None else scan.index + 1,
             fps=None if status is None else status.frames_per_s,
             obstacle_messages=end.obstacle_messages,
             obstacle_rate_hz=(end.obstacle_messages - start.obstacle_messages) / flown_s,
@@ -163,7 +176,7 @@ class DemoFlight:
             flew=flew,
             stopped=stopped,
             collided=end.collided,
-            stop_distance_m=None if self.scan is None else nearest_ahead_m(self.scan),
+            stop_distance_m=None if scan is None else nearest_ahead_m(scan),
             true_distance_m=true_distance_ahead_m(
                 scene,
                 end.position_ned_m,
@@ -175,6 +188,15 @@ class DemoFlight:
             flown_s=flown_s,
             reason=reason,
         )
+
+    def _keep_moment(self) -> None:
+        """Keep the first moment at which the scan shows something near ahead."""
+        if self.on_the_way is not None or self.observer is None:
+            return
+        scan = self.observer.scan
+        ahead_m = None if scan is None else nearest_ahead_m(scan)
+        if ahead_m is not None and ahead_m < ON_THE_WAY_M:
+            self.on_the_way = _moment(self.observer)
 
     def _wait_until(
         self, is_so: Callable[[], bool], timeout_s: float, problem: str, companion: Companion
@@ -196,6 +218,11 @@ class DemoFlight:
         if self.autopilot is None:
             raise UavDepthError("the demo's autopilot was not started")
         return self.autopilot
+
+
+def _moment(observer: GroundObserver) -> Moment | None:
+    pictures, scan = observer.pictures(), observer.scan
+    return None if pictures is None or scan is None else Moment(pictures, scan)
 
 
 def nearest_ahead_m(sample: ScanSample) -> float | None:

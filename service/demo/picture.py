@@ -23,6 +23,7 @@ def draw_side_by_side(
     scan: ObstacleScan | None,
     near_m: float,
     far_m: float,
+    caption: str = "camera",
 ) -> NDArray[np.uint8]:
     """Camera, depth and sector radar in one row, each under its caption.
 
@@ -31,12 +32,13 @@ def draw_side_by_side(
         depth_m: (H, W) float32 z-depth in metres, NaN where unknown.
         scan: the scan made of it, or None.
         near_m, far_m: ends of the depth colours in metres; lighter = nearer.
+        caption: over the camera picture.
 
     Returns:
         (h, w, 3) uint8 BGR.
     """
     panels = [
-        _panel(image_bgr, "camera"),
+        _panel(image_bgr, caption),
         _panel(
             colorize_depth(depth_m, near_m, far_m), f"depth, lighter = nearer ({near_m:g} to {far_m:g} m)"
         ),
