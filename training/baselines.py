@@ -9,9 +9,9 @@ from training.metrics import DEPTH_CAP_M
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
 
-TRAINING_MEDIAN_DEPTH_M = 10.2
-"""Median depth nearer than 80 m of 480 rendered training frames, 120 of each scene, weighted as training
-draws them (`training.data.batches.SCENE_SHARES`)."""
+TRAINING_MEDIAN_DEPTH_M = 10.0
+"""Median depth nearer than 80 m of 480 of the training frames of the network that ships, 120 of each scene,
+weighted as training draws them (`training.data.batches.SCENE_SHARES`)."""
 
 
 def constant_depth(camera: CameraModel) -> NDArray[np.float32]:

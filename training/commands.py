@@ -145,9 +145,15 @@ def _evaluate(
 
 
 def _indices_for_sheet(plan: EvaluationPlan) -> set[int]:
-    """Frames spread over all worlds, first those of different worlds."""
-    count = min(_SHEET_ROWS, plan.frames_count)
-    return {int((number + 0.5) * plan.frames_count / count) for number in range(count)}
+    """Numbers of frames of the plan, as many of each scene, spread over its worlds."""
+    per_scene = plan.frames_count // len(plan.scenes)
+    rows = min(max(_SHEET_ROWS // len(plan.scenes), 1), per_scene)
+    chosen = set()
+    for scene in range(len(plan.scenes)):
+        for row in range(rows):
+            world, frame = divmod(int((row + 0.5) * per_scene / rows), plan.frames_per_seed)
+            chosen.add((world * len(plan.scenes) + scene) * plan.frames_per_seed + frame)
+    return chosen
 
 
 def _with_progress(plan: EvaluationPlan) -> Iterator[EvaluationFrame]:

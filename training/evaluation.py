@@ -25,6 +25,7 @@ class Method(StrEnum):
 
     NETWORK = "network"
     GROUND_SCALED = "network, scaled by the ground"
+    NETWORK_THERE = "network, on those frames"
     CONSTANT = "constant depth"
     FLAT_GROUND = "flat ground"
 
@@ -87,12 +88,16 @@ def measure_frame(model: DepthModel, item: EvaluationFrame) -> MeasuredFrame:
         answers[Method.FLAT_GROUND] = flat_ground_depth(
             frame.camera, frame.mount, frame.attitude, frame.height_m
         )
-    methods = {method: _errors(truth, depth) for method, depth in answers.items()}
+    found = {method: _errors(truth, depth) for method, depth in answers.items()}
+    methods = {method: errors for method, errors in found.items() if errors is not None}
+    if Method.GROUND_SCALED in methods:
+        # What the ground adds shows only against the same frames without it.
+        methods[Method.NETWORK_THERE] = methods[Method.NETWORK]
     errors = FrameErrors(
         item.scene,
         item.seed,
         item.index,
-        {method: found for method, found in methods.items() if found is not None},
+        methods,
         factor,
         None if ground is None else ground.factor,
         _within_sigma(frame, predicted, answer.relative_sigma, factor),

@@ -70,7 +70,9 @@ class EvaluationReport:
     def _summary(self) -> dict[str, Any]:
         """What a model card tells."""
         rows = {row.method: row for row in summarise(self.errors)}
-        network, ground = rows[Method.NETWORK], rows[Method.GROUND_SCALED]
+        network, ground, there = (
+            rows[method] for method in (Method.NETWORK, Method.GROUND_SCALED, Method.NETWORK_THERE)
+        )
         return {
             "data": (
                 f"rendered frames of {self.split.name.lower()} seeds {_ranges(self.seeds)} of "
@@ -82,6 +84,7 @@ class EvaluationReport:
             "unscaled": _numbers(network.unscaled),
             "scaled_by_ground": _numbers(ground.unscaled),
             "frames_scaled_by_ground": ground.frames,
+            "unscaled_on_those_frames": _numbers(there.unscaled),
             "median_scaled_constant_depth_abs_rel": _abs_rel(rows[Method.CONSTANT].scaled),
             "median_scaled_flat_ground_abs_rel": _abs_rel(rows[Method.FLAT_GROUND].scaled),
         }
@@ -132,7 +135,7 @@ def _table(name: str, errors: Sequence[FrameErrors]) -> Table:
         table.add_column(heading, justify="left" if heading in ("depth from", "scale") else "right")
     rows = summarise(errors)
     for row in rows:
-        if row.method is not Method.GROUND_SCALED:
+        if row.method not in (Method.GROUND_SCALED, Method.NETWORK_THERE):
             table.add_row(*_cells(row, "median", row.scaled))
     table.add_section()
     for row in rows:

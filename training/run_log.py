@@ -36,10 +36,16 @@ class RunSummary:
     total: float
     frames: int
 
+    @property
+    def left_s(self) -> float:
+        """Seconds of training that are left if the rest goes as the run has so far."""
+        return self.trained_s * (1.0 - self.progress) / max(self.progress, 1e-9)
+
     def line(self) -> str:
         """One line for people."""
         return (
-            f"{100 * self.progress:5.1f} %  step {self.step}  {self.images} pictures  "
+            f"{100 * self.progress:5.1f} %  {self.left_s / 60:.1f} min left  "
+            f"step {self.step}  {self.images} pictures  "
             f"{self.images_per_s:.1f}/s  loss {self.total:.3f}  absolute {self.absolute:.3f}  "
             f"shape {self.shape:.3f}  edges {self.edges:.3f}  frames {self.frames}"
         )
