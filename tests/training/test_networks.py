@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import cast
 
 import pytest
 import torch
@@ -11,6 +12,7 @@ from training.errors import PretrainedWeightsError
 from training.networks.aggregation import AggregationGrid, AggregationNode, LightAggregationNode
 from training.networks.attention import EfficientChannelAttention, eca_kernel_size
 from training.networks.blocks import ConvNormRelu, replicate_border
+from training.networks.decoder import DecoderStage
 from training.networks.depth_network import DepthNetwork, NetworkShape
 from training.networks.encoder import BATCH_NORM_EPSILON, ENCODER_CHANNELS, EfficientNetLite0
 
@@ -39,7 +41,7 @@ def test_the_attention_kernel_is_the_nearest_odd_number_of_the_formula(channels:
 def test_every_decoder_stage_has_the_kernel_of_its_width() -> None:
     network = DepthNetwork()
     for stage, channels in zip(network.decoder.stages, network.shape.channels, strict=False):
-        assert stage.attention.across_channels.kernel_size == (eca_kernel_size(channels),)
+        assert cast(DecoderStage, stage).attention.across_channels.kernel_size == (eca_kernel_size(channels),)
 
 
 def test_attention_has_no_kernel_for_no_channels() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -149,7 +150,7 @@ class Corridor:
             return np.array([np.inf])
         return np.array([(math.copysign(self.WALL_M, north) - origin_ned_m[0]) / north])
 
-    def clearance_m(self, position_ned_m: list[float]) -> float:
+    def clearance_m(self, position_ned_m: Sequence[float]) -> float:
         return max(0.0, min(self.WALL_M - abs(position_ned_m[0]), -position_ned_m[2]))
 
     def flight(self, seed: int, duration_s: float) -> Corridor:
