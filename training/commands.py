@@ -124,7 +124,7 @@ def _evaluate(
     from uavdepth.depth_model import DepthModel
 
     network = DepthModel.load(model, provider, threads)
-    shown = _indices_for_sheet(plan) if with_sheet else set()
+    shown = indices_for_sheet(plan) if with_sheet else set()
     errors, rows = [], []
     for number, item in enumerate(_with_progress(plan)):
         measured = measure_frame(network, item)
@@ -144,7 +144,7 @@ def _evaluate(
     return report, rows
 
 
-def _indices_for_sheet(plan: EvaluationPlan) -> set[int]:
+def indices_for_sheet(plan: EvaluationPlan) -> set[int]:
     """Numbers of frames of the plan, as many of each scene, spread over its worlds."""
     per_scene = plan.frames_count // len(plan.scenes)
     rows = min(max(_SHEET_ROWS // len(plan.scenes), 1), per_scene)

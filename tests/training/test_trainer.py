@@ -19,7 +19,7 @@ from training.data.batches import FramePool
 from training.errors import CheckpointError, TrainingSettingsError
 from training.networks.depth_network import NetworkShape
 from training.precision import autocast, resolve_precision
-from training.run_log import RunLog, read_log
+from training.run_log import RunLog, RunSummary, read_log
 from training.settings import SizePhase, TrainingSettings
 from training.train_command import train
 from training.trainer import Trainer
@@ -198,6 +198,12 @@ def test_the_log_tells_means_and_can_be_read_back(pool: FramePool, tmp_path: Pat
     assert last.total == pytest.approx(sum(float(r.terms.total) for r in reports) / len(reports), rel=1e-5)
     assert read_log(tmp_path / "log.jsonl") == [last]
     assert "100.0 %" in last.line()
+
+
+def test_the_time_left_follows_the_pace_so_far() -> None:
+    summary = RunSummary(1, 8, 300.0, 0.25, 0.1, 1.0, 0.5, 0.2, 0.1, 0.0, 0.6, 6)
+    assert summary.left_s == pytest.approx(900.0)
+    assert "15.0 min left" in summary.line()
 
 
 def test_the_command_trains_and_refuses_to_overwrite(
