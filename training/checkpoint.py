@@ -25,7 +25,6 @@ _LOAD_ERRORS = (
     EOFError,
     OSError,
     ValueError,
-    pickle.UnpicklingError,
 )
 """Whatever PyTorch and the settings raise for a file that is something else."""
 
@@ -71,6 +70,9 @@ class Checkpoint:
             return cls(settings=_settings(content.pop("settings")), **content)
         except CheckpointError:
             raise
+        except pickle.UnpicklingError as error:
+            # PyTorch's own text advises to load the file without its protection.
+            raise CheckpointError(f"{path} is not a checkpoint of this program") from error
         except _LOAD_ERRORS as error:
             raise CheckpointError(f"{path} is not a checkpoint of this program: {error}") from error
 
