@@ -16,13 +16,14 @@ class TextureAtlas:
     """Mip pyramids of T textures.
 
     Args:
-        texels: (K, 4) uint8 BGR and gloss, all levels of all textures, rows first.
+        texels: (K,) uint32 of all levels of all textures, rows first; from the low byte on they are blue,
+            green, red, gloss.
         start: (T,) int64 index of each texture's finest level in `texels`; coarser ones follow.
         levels: (T,) int32 number of levels; the finest has side 2 ** (levels - 1), the last is 1 x 1.
         per_metre: (T,) float32 repetitions per metre.
     """
 
-    texels: NDArray[np.uint8]
+    texels: NDArray[np.uint32]
     start: NDArray[np.int64]
     levels: NDArray[np.int32]
     per_metre: NDArray[np.float32]
@@ -36,7 +37,7 @@ def build_atlas(names: tuple[str, ...], seed: int) -> TextureAtlas:
     sizes = [len(pyramid) for pyramid in pyramids]
     sides = [painted_side(size) for size in sizes]
     return TextureAtlas(
-        np.concatenate(pyramids),
+        np.concatenate(pyramids).view("<u4")[:, 0].astype(np.uint32, copy=False),
         np.cumsum([0, *sizes[:-1]]).astype(np.int64),
         np.array([side.bit_length() for side in sides], np.int32),
         np.array([1.0 / texture_source(name).size_m for name in names], np.float32),

@@ -4,37 +4,94 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+import numpy as np
+from numpy.typing import NDArray
+
+from uavdepth.scenes.kernels import kernel
+
+_BLOCK = 32
+"""Triangles in a block: few enough that their common box is tight, many enough that boxes are few."""
+
+_CELLS = 1 << 10
+"""Steps along each axis of the curve that brings neighbouring triangles together."""
 
 
-@njit(cache=True, nogil=True)
-def nearest_surface(point, vertices, faces, low, high, limit):  # type: ignore[no-untyped-def]
-    """Distance in metres from `point` to the nearest triangle, or `limit` when none is nearer.
+class NearestSurface:
+    """The triangles of one mesh in blocks of neighbours, for distances from points to the nearest one.
 
     Args:
-        point: (3,) float64 NED.
-        vertices: (N, 3) float32. faces: (M, 3) int32.
-        low, high: (M, 3) float32 corners of each triangle's bounding box.
-        limit: metres.
+        vertices_m: (N, 3) float32.
+        faces: (M, 3) int32 vertex numbers.
+    """
 
-    Distance to a triangle after Ericson, Real-Time Collision Detection (2005), section 5.1.5.
+    def __init__(self, vertices_m: NDArray[np.float32], faces: NDArray[np.int32]) -> None:
+        self._vertices = vertices_m
+        self._faces = faces
+        low = np.minimum.reduce([vertices_m[faces[:, corner]] for corner in range(3)])
+        high = np.maximum.reduce([vertices_m[faces[:, corner]] for corner in range(3)])
+        self._order = _neighbours_together(low, high)
+        first = np.arange(0, len(faces), _BLOCK)
+        self._low = np.minimum.reduceat(low[self._order], first)
+        self._high = np.maximum.reduceat(high[self._order], first)
+
+    def distance_m(self, point_m: NDArray[np.float64], limit_m: float) -> float:
+        """Metres from a (3,) point to the nearest triangle, or `limit_m` when none is nearer."""
+        return float(
+            _nearest(point_m, self._vertices, self._faces, self._order, self._low, self._high, limit_m)
+        )
+
+
+def _neighbours_together(low: NDArray[np.float32], high: NDArray[np.float32]) -> NDArray[np.int32]:
+    """Order of the triangles along a Morton curve, those of a like size together: one large triangle would
+    spoil the box of 31 small ones."""
+    size = np.linalg.norm(high - low, axis=1)
+    octave = np.floor(np.log2(np.maximum(size, 1e-3))).astype(np.int64)
+    middle = 0.5 * (low + high)
+    start, span = middle.min(axis=0), np.maximum(np.ptp(middle, axis=0), 1e-6)
+    cell = np.minimum((middle - start) / span * _CELLS, _CELLS - 1).astype(np.int64)
+    code = np.zeros(len(low), np.int64)
+    for bit in range(_CELLS.bit_length() - 1):
+        for axis in range(3):
+            code |= ((cell[:, axis] >> bit) & 1) << (3 * bit + axis)
+    return np.lexsort((code, octave)).astype(np.int32)
+
+
+@kernel
+def _nearest(point, vertices, faces, order, low, high, limit):  # type: ignore[no-untyped-def]
+    """Distance from `point` to the nearest triangle, at most `limit`.
+
+    Args:
+        point: (3,) float64. vertices: (N, 3) float32. faces: (M, 3) int32.
+        order: (M,) int32 faces block by block. low, high: (B, 3) float32 boxes of the blocks.
     """
     best = limit * limit
-    for f in range(len(faces)):
-        away = 0.0
+    gaps = np.empty(len(low), np.float64)
+    nearest = 0
+    for block in range(len(low)):
+        gap = 0.0
         for axis in range(3):
-            gap = max(low[f, axis] - point[axis], point[axis] - high[f, axis], 0.0)
-            away += gap * gap
-        if away < best:
-            best = min(
-                best, _squared(point, vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]])
-            )
+            away = max(low[block, axis] - point[axis], point[axis] - high[block, axis], 0.0)
+            gap += away * away
+        gaps[block] = gap
+        if gap < gaps[nearest]:
+            nearest = block
+    # The nearest box first: its triangles rule out almost all others.
+    for turn in range(-1, len(low)):
+        block = nearest if turn < 0 else turn
+        if gaps[block] < best:
+            for place in range(block * _BLOCK, min((block + 1) * _BLOCK, len(order))):
+                f = order[place]
+                a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
+                best = min(best, _squared(point, a, b, c))
     return math.sqrt(best)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _squared(p, a, b, c):  # type: ignore[no-untyped-def]
-    """Squared distance from p to triangle a, b, c."""
+    """Squared distance from p to triangle a, b, c.
+
+    After Ericson, Real-Time Collision Detection (2005), section 5.1.5.
+    """
     abx, aby, abz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     acx, acy, acz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
     apx, apy, apz = p[0] - a[0], p[1] - a[1], p[2] - a[2]

@@ -5,18 +5,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from uavdepth.scenes.description import SceneDescription
+from uavdepth.scenes.kernels import kernel
 from uavdepth.scenes.noise import cloud_noise
 
 CLOUD_SIDE = 512
 _CLOUD_SCALE = 0.11
 """Cloud tiles per unit of (horizontal / up) direction: how large clouds look."""
-
-FAST = {"contract", "reassoc", "nsz", "arcp"}
-"""Floating-point freedom for the kernels: everything but assuming that inf and NaN do not exist."""
 
 
 def cloud_map(seed: int) -> NDArray[np.float32]:
@@ -43,29 +40,29 @@ def light_table(description: SceneDescription) -> NDArray[np.float32]:
     return table
 
 
-@njit(cache=True, nogil=True, fastmath=FAST)
+@kernel
 def wrapped_bilinear(field, x, y):  # type: ignore[no-untyped-def]
-    """Value of a tileable square field (side a power of two) at x, y in pixels."""
+    """Value of a tileable square float32 field (side a power of two) at float32 x, y in pixels."""
     mask = field.shape[0] - 1
     fx = math.floor(x)
     fy = math.floor(y)
-    ax = x - fx
-    ay = y - fy
-    x0 = int(fx) & mask
-    y0 = int(fy) & mask
+    ax = np.float32(x - fx)
+    ay = np.float32(y - fy)
+    x0 = fx & mask
+    y0 = fy & mask
     x1 = (x0 + 1) & mask
     y1 = (y0 + 1) & mask
-    top = field[y0, x0] * (1.0 - ax) + field[y0, x1] * ax
-    bottom = field[y1, x0] * (1.0 - ax) + field[y1, x1] * ax
-    return top * (1.0 - ay) + bottom * ay
+    top = field[y0, x0] + (field[y0, x1] - field[y0, x0]) * ax
+    bottom = field[y1, x0] + (field[y1, x1] - field[y1, x0]) * ax
+    return top + (bottom - top) * ay
 
 
-@njit(cache=True, nogil=True, fastmath=FAST)
+@kernel
 def sky_color(dn, de, dd, light, clouds):  # type: ignore[no-untyped-def]
     """Linear blue, green, red of the sky along a unit NED direction.
 
     Args:
-        dn, de, dd: the direction.
+        dn, de, dd: the direction, float32.
         light: `light_table`.
         clouds: `cloud_map`.
     """
@@ -79,7 +76,7 @@ def sky_color(dn, de, dd, light, clouds):  # type: ignore[no-untyped-def]
     thick = 0.0
     if up > 0.015 and amount > 0.0:
         reach = _CLOUD_SCALE * CLOUD_SIDE / (up + 0.12)
-        thickness = wrapped_bilinear(clouds, dn * reach + 37.0, de * reach + 11.0)
+        thickness = wrapped_bilinear(clouds, np.float32(dn * reach + 37.0), np.float32(de * reach + 11.0))
         edge = 1.0 - amount
         cover = min(max((thickness - edge) / 0.28, 0.0), 1.0)
         cover = cover * cover * (3.0 - 2.0 * cover) * min((up - 0.015) * 12.0, 1.0)
@@ -93,7 +90,7 @@ def sky_color(dn, de, dd, light, clouds):  # type: ignore[no-untyped-def]
     paint = 0.92 * cover * white
     tone = 0.35
     return (
-        blue * keep + paint * (tone * light[4, 0] + 1.0 - tone),
-        green * keep + paint * (tone * light[4, 1] + 1.0 - tone),
-        red * keep + paint * (tone * light[4, 2] + 1.0 - tone),
+        np.float32(blue * keep + paint * (tone * light[4, 0] + 1.0 - tone)),
+        np.float32(green * keep + paint * (tone * light[4, 1] + 1.0 - tone)),
+        np.float32(red * keep + paint * (tone * light[4, 2] + 1.0 - tone)),
     )

@@ -1,13 +1,16 @@
-"""Filtered lookups in a `TextureAtlas`: bilinear, between mip levels, and along a pixel's footprint."""
+"""Filtered lookups in a `TextureAtlas`: bilinear, between mip levels, and along a pixel's footprint.
+
+The four channels of a texel are weighted together: spread over the 16-bit lanes of one 64-bit integer, with
+weights of 8 bits, as graphics hardware does it.
+"""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-from numba import njit
 
-from uavdepth.scenes.sky import FAST
+from uavdepth.scenes.kernels import kernel
 
 _MOST_SAMPLES = 8
 """Most texture samples along a pixel's footprint: surfaces seen more obliquely than 1:8 blur."""
@@ -15,87 +18,109 @@ _MOST_SAMPLES = 8
 _SHARPER = 0.3
 """Mip levels finer than the footprint asks for: trilinear filtering alone is softer than a lens."""
 
+_LEAST_PART = 0.02
+"""Weight of a coarser level below which it is not looked up."""
 
-@njit(cache=True, nogil=True, fastmath=FAST)
-def _texel(texels, base, side, x, y):  # type: ignore[no-untyped-def]
-    """Bilinear lookup in one level: x, y in repetitions. Returns blue, green, red, gloss, 0 to 255."""
-    px = x * side - 0.5
-    py = y * side - 0.5
-    fx = math.floor(px)
-    fy = math.floor(py)
-    ax = np.float32(px - fx)
-    ay = np.float32(py - fy)
-    mask = side - 1
-    x0 = int(fx) & mask
-    y0 = int(fy) & mask
+_POINT = 16
+_ONE = 1 << _POINT
+"""Places in a level are integers with 16 bits after the point."""
+
+_BYTES = np.uint64(0x00FF00FF00FF00FF)
+_HALVES = np.uint64(0x0000FFFF0000FFFF)
+_TO_HIGH = np.uint64(24)
+_ODD = np.uint64(16)
+_LOW = np.uint64(0xFFFFFFFF)
+_HIGH = np.uint64(32)
+
+
+@kernel
+def _lanes(texels, at):  # type: ignore[no-untyped-def]
+    """One texel's channels in 16-bit lanes, from low to high blue, red, green, gloss."""
+    packed = np.uint64(texels[np.uint64(at)])
+    return (packed | (packed << _TO_HIGH)) & _BYTES
+
+
+@kernel
+def _bilinear(texels, base, shift, x, y):  # type: ignore[no-untyped-def]
+    """256 times the texels around a place in the level that starts at `base` with side 2 ** shift.
+
+    Args:
+        x, y: the place in texels times `_ONE`; texel centres lie at halves.
+    """
+    mask = (1 << shift) - 1
+    px = x - _ONE // 2
+    py = y - _ONE // 2
+    x0 = (px >> _POINT) & mask
+    y0 = ((py >> _POINT) & mask) << shift
     x1 = (x0 + 1) & mask
-    y1 = (y0 + 1) & mask
-    p00 = texels[base + y0 * side + x0]
-    p01 = texels[base + y0 * side + x1]
-    p10 = texels[base + y1 * side + x0]
-    p11 = texels[base + y1 * side + x1]
-    one = np.float32(1.0)
-    w00 = (one - ax) * (one - ay)
-    w01 = ax * (one - ay)
-    w10 = (one - ax) * ay
-    w11 = ax * ay
+    y1 = (y0 + (1 << shift)) & (mask << shift)
+    ax = (px >> (_POINT - 8)) & 255
+    ay = (py >> (_POINT - 8)) & 255
+    both = (ax * ay + 128) >> 8
     return (
-        w00 * p00[0] + w01 * p01[0] + w10 * p10[0] + w11 * p11[0],
-        w00 * p00[1] + w01 * p01[1] + w10 * p10[1] + w11 * p11[1],
-        w00 * p00[2] + w01 * p01[2] + w10 * p10[2] + w11 * p11[2],
-        w00 * p00[3] + w01 * p01[3] + w10 * p10[3] + w11 * p11[3],
+        _lanes(texels, base + y0 + x0) * np.uint64(256 - ax - ay + both)
+        + _lanes(texels, base + y0 + x1) * np.uint64(ax - both)
+        + _lanes(texels, base + y1 + x0) * np.uint64(ay - both)
+        + _lanes(texels, base + y1 + x1) * np.uint64(both)
     )
 
 
-@njit(cache=True, nogil=True, fastmath=FAST)
-def _level(texels, start, levels, level, x, y):  # type: ignore[no-untyped-def]
-    """`_texel` at a mip level of a texture whose finest side is 2 ** (levels - 1)."""
-    base = start
-    side = 1 << (levels - 1)
-    for _ in range(level):
-        base += side * side
-        side >>= 1
-    return _texel(texels, base, side, x, y)
+@kernel
+def _along(texels, base, shift, x, y, step_x, step_y, samples):  # type: ignore[no-untyped-def]
+    """Sum of `_bilinear` over a row of places: blue and green, red and gloss, in 32-bit lanes."""
+    even = np.uint64(0)
+    odd = np.uint64(0)
+    for _ in range(samples):
+        lanes = _bilinear(texels, base, shift, x, y)
+        even += lanes & _HALVES
+        odd += (lanes >> _ODD) & _HALVES
+        x += step_x
+        y += step_y
+    return even, odd
 
 
-@njit(cache=True, nogil=True, fastmath=FAST)
+@kernel
 def filtered(texels, start, levels, x, y, ax, ay, bx, by):  # type: ignore[no-untyped-def]
     """Texture averaged over the parallelogram of half axes a/2, b/2 around x, y (in repetitions).
 
     Samples are spread along the longer axis and each is filtered trilinearly with the shorter one, as
-    graphics hardware does anisotropic filtering.
+    graphics hardware does anisotropic filtering. Returns blue, green, red, gloss, 0 to 1.
     """
     long = math.sqrt(ax * ax + ay * ay)
     short = math.sqrt(bx * bx + by * by)
     if short > long:
         long, short = short, long
         ax, ay = bx, by
-    side = float(1 << (levels - 1))
+    top = levels - 1
+    side = float(1 << top)
     samples = 1
     if long * side > 1.0:
         samples = int(min(math.ceil(long / max(short, 1.0 / side)), _MOST_SAMPLES))
     footprint = max(long / samples, short) * side
-    lod = min(max(math.log2(max(footprint, 1e-6)) - _SHARPER, 0.0), levels - 1.0)
+    lod = min(max(math.log2(max(footprint, 1e-6)) - _SHARPER, 0.0), float(top))
     low = int(lod)
     part = np.float32(lod - low)
-    blue = np.float32(0.0)
-    green = np.float32(0.0)
-    red = np.float32(0.0)
-    gloss = np.float32(0.0)
-    for k in range(samples):
-        step = (k + 0.5) / samples - 0.5
-        sx = x + ax * step
-        sy = y + ay * step
-        b, g, r, s = _level(texels, start, levels, low, sx, sy)
-        if part > 0.02 and low < levels - 1:
-            b2, g2, r2, s2 = _level(texels, start, levels, low + 1, sx, sy)
-            b += (b2 - b) * part
-            g += (g2 - g) * part
-            r += (r2 - r) * part
-            s += (s2 - s) * part
-        blue += b
-        green += g
-        red += r
-        gloss += s
-    scale = np.float32(1.0 / (255.0 * samples))
-    return blue * scale, green * scale, red * scale, gloss * scale
+
+    shift = top - low
+    base = start + ((1 << (2 * top)) - (1 << (2 * shift))) * 4 // 3
+    scale = float(1 << (shift + _POINT))
+    back = 0.5 / samples - 0.5
+    px = int((x - math.floor(x) + ax * back) * scale)
+    py = int((y - math.floor(y) + ay * back) * scale)
+    step_x = int(ax / samples * scale)
+    step_y = int(ay / samples * scale)
+    even, odd = _along(texels, base, shift, px, py, step_x, step_y, samples)
+    unit = np.float32(1.0 / (256.0 * 255.0)) / np.float32(samples)
+    blue = np.float32(even & _LOW)
+    green = np.float32(even >> _HIGH)
+    red = np.float32(odd & _LOW)
+    gloss = np.float32(odd >> _HIGH)
+    if part > _LEAST_PART and shift > 0:
+        even, odd = _along(
+            texels, base + (1 << (2 * shift)), shift - 1, px >> 1, py >> 1, step_x >> 1, step_y >> 1, samples
+        )
+        blue += (np.float32(even & _LOW) - blue) * part
+        green += (np.float32(even >> _HIGH) - green) * part
+        red += (np.float32(odd & _LOW) - red) * part
+        gloss += (np.float32(odd >> _HIGH) - gloss) * part
+    return blue * unit, green * unit, red * unit, gloss * unit

@@ -1,19 +1,19 @@
-"""Rays against triangles, on Embree through the embreex wheel."""
+"""Rays against the triangles of one mesh."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from embreex.mesh_construction import TriangleMesh
-from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
+from uavdepth.scenes.embree import PACKET, RAY_HIT_ROWS, EmbreeTriangles, aligned_rows, call_packet
+from uavdepth.scenes.kernels import kernel
 from uavdepth.scenes.mesh import Mesh
 
-_MISS = -1
-_FREE = -1
-"""What embreex's OCCLUDED query returns for a ray that meets nothing (0 for one that is stopped)."""
+_ORIGIN, _NEAR, _DIRECTION, _TIME, _FAR, _MASK, _ID, _FLAGS = 0, 3, 4, 7, 8, 9, 10, 11
+_U, _V, _FACE, _GEOMETRY = 15, 16, 17, 18
+"""Rows of an RTCRayHit16."""
 
 
 @dataclass(frozen=True)
@@ -33,41 +33,127 @@ class Hits:
 
 
 class RayTracer:
-    """The triangles of one mesh in an Embree acceleration structure (watertight: `robust`)."""
+    """The triangles of one mesh, ready for rays.
+
+    `order` of its methods: (N,) int32, the sequence in which rays are taken, 16 at a time. Rays that start
+    and lead close together should follow each other. Answers come in the order of the arguments.
+    """
 
     def __init__(self, mesh: Mesh) -> None:
-        self._scene = EmbreeScene(robust=True)
-        self._mesh = TriangleMesh(self._scene, mesh.vertices_m, mesh.faces)
+        self._triangles = EmbreeTriangles(mesh.vertices_m, mesh.faces)
 
-    def nearest(self, origins_m: NDArray[np.float32], directions: NDArray[np.float32]) -> Hits:
+    def nearest(
+        self,
+        origins_m: NDArray[np.float32],
+        directions: NDArray[np.float32],
+        order: NDArray[np.int32] | None = None,
+    ) -> Hits:
         """First surface along each ray.
 
         Args:
             origins_m: (N, 3) or (3,) float32 NED; one origin serves all rays.
             directions: (N, 3) float32, any length above 0.
+            order: the rays are neighbours in this order; None: they have nothing in common.
         """
-        result = self._scene.run(
-            _per_ray(origins_m, len(directions)),
-            np.ascontiguousarray(directions, np.float32),
-            query="INTERSECT",
-            output=True,
+        count = len(directions)
+        hits = Hits(
+            np.empty(count, np.int32),
+            np.empty(count, np.float32),
+            np.empty(count, np.float32),
+            np.empty(count, np.float32),
         )
-        face = result["primID"]
-        return Hits(
-            face, result["u"], result["v"], np.where(face == _MISS, np.float32(np.inf), result["tfar"])
+        triangles = self._triangles
+        _intersect(
+            triangles.intersect,
+            triangles.handle,
+            triangles.incoherent if order is None else triangles.coherent,
+            _rows(origins_m),
+            _rows(directions),
+            np.arange(count, dtype=np.int32) if order is None else order,
+            *_packet(),
+            hits.face,
+            hits.u,
+            hits.v,
+            hits.t,
         )
+        return hits
 
-    def occluded(self, origins_m: NDArray[np.float32], directions: NDArray[np.float32]) -> NDArray[np.bool_]:
-        """(N,) True where anything lies along the ray, at any distance. Arguments as for `nearest`."""
-        if len(directions) == 0:
-            return np.zeros(0, np.bool_)
-        answer = self._scene.run(
-            _per_ray(origins_m, len(directions)),
-            np.ascontiguousarray(directions, np.float32),
-            query="OCCLUDED",
+    def occluded(self, origins_m: NDArray[np.float32], direction: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """(N,) True where anything lies, at any distance, along one (3,) direction from (N, 3) points,
+        neighbours in the order given."""
+        triangles = self._triangles
+        stopped = np.empty(len(origins_m), np.bool_)
+        _occlude(
+            triangles.occluded,
+            triangles.handle,
+            triangles.coherent,
+            _rows(origins_m),
+            np.asarray(direction, np.float32),
+            *_packet(),
+            stopped,
         )
-        return np.asarray(answer != _FREE)
+        return stopped
 
 
-def _per_ray(origins_m: NDArray[np.float32], count: int) -> NDArray[np.float32]:
-    return np.ascontiguousarray(np.broadcast_to(np.asarray(origins_m, np.float32), (count, 3)))
+def _packet() -> tuple[int, NDArray[np.float32], NDArray[np.int32], int]:
+    """An empty RTCRayHit16: address, its rows as float32 and as int32; and the address of one more row, which
+    says with -1 which of its rays are valid."""
+    rows = aligned_rows(RAY_HIT_ROWS + 1)
+    return rows.ctypes.data, rows, rows.view(np.int32), rows[RAY_HIT_ROWS:].ctypes.data
+
+
+def _rows(vectors: NDArray[np.float32]) -> NDArray[np.float32]:
+    return np.ascontiguousarray(vectors, np.float32).reshape(-1, 3)
+
+
+@kernel
+def _intersect(call, scene, arguments, origins, directions, order, at, packet, numbers, valid, face, u, v, t):  # type: ignore[no-untyped-def]
+    """Fill face, u, v, t for all rays. at, packet, numbers, valid: from `_packet`."""
+    shared = len(origins) == 1
+    for first in range(0, len(order), PACKET):
+        width = min(PACKET, len(order) - first)
+        for k in range(PACKET):
+            numbers[RAY_HIT_ROWS, k] = -1 if k < width else 0
+            i = order[first + min(k, width - 1)]
+            j = 0 if shared else i
+            for axis in range(3):
+                packet[_ORIGIN + axis, k] = origins[j, axis]
+                packet[_DIRECTION + axis, k] = directions[i, axis]
+            packet[_NEAR, k] = 0.0
+            packet[_TIME, k] = 0.0
+            packet[_FAR, k] = np.inf
+            numbers[_MASK, k] = -1
+            numbers[_ID, k] = 0
+            numbers[_FLAGS, k] = 0
+            numbers[_FACE, k] = -1
+            numbers[_GEOMETRY, k] = -1
+        call_packet(call, valid, scene, at, arguments)
+        for k in range(width):
+            i = order[first + k]
+            hit = numbers[_GEOMETRY, k] != -1
+            face[i] = numbers[_FACE, k] if hit else -1
+            u[i] = packet[_U, k] if hit else 0.0
+            v[i] = packet[_V, k] if hit else 0.0
+            t[i] = packet[_FAR, k] if hit else np.inf
+
+
+@kernel
+def _occlude(call, scene, arguments, origins, direction, at, packet, numbers, valid, stopped):  # type: ignore[no-untyped-def]
+    """Fill stopped for all rays. at, packet, numbers, valid: from `_packet`."""
+    for first in range(0, len(origins), PACKET):
+        width = min(PACKET, len(origins) - first)
+        for k in range(PACKET):
+            numbers[RAY_HIT_ROWS, k] = -1 if k < width else 0
+            i = first + min(k, width - 1)
+            for axis in range(3):
+                packet[_ORIGIN + axis, k] = origins[i, axis]
+                packet[_DIRECTION + axis, k] = direction[axis]
+            packet[_NEAR, k] = 0.0
+            packet[_TIME, k] = 0.0
+            packet[_FAR, k] = np.inf
+            numbers[_MASK, k] = -1
+            numbers[_ID, k] = 0
+            numbers[_FLAGS, k] = 0
+        call_packet(call, valid, scene, at, arguments)
+        for k in range(width):
+            stopped[first + k] = packet[_FAR, k] < 0.0  # Embree writes -inf
