@@ -26,9 +26,10 @@ def train(
     output: Annotated[Path, typer.Option(help="Folder of the run: checkpoint and log.")] = Path(
         "training_run"
     ),
-    render_seeds: Annotated[
-        int, typer.Option(min=0, max=900, help="Render worlds of seeds 0 to this many first, where missing.")
-    ] = 0,
+    render: Annotated[bool, typer.Option(help="Render what is missing of the frames first.")] = False,
+    seeds: Annotated[
+        int, typer.Option(min=1, max=900, help="How many worlds of each scene to render, from seed 0.")
+    ] = 60,
     scenes: Annotated[str, typer.Option(help="Scenes to render, by commas.")] = "city,mountain,forest,wall",
     frames_per_seed: Annotated[int, typer.Option(min=1, help="Frames rendered of each world.")] = 24,
     minutes: Annotated[
@@ -46,8 +47,9 @@ def train(
     A run in minutes plans its learning rates by the clock, one in pictures is repeatable. Frames may be
     added to the folder while the run goes on. Worlds kept for validation and tests are refused.
     """
-    if render_seeds:
-        _render(data, scenes, render_seeds, frames_per_seed)
+    settings = _settings_maker(minutes, images, seed, precision)
+    if render:
+        _render(data, scenes, seeds, frames_per_seed)
     with needs_extra("train", "train"):
         import cv2
         import torch
@@ -55,9 +57,7 @@ def train(
     cv2.setNumThreads(1)
     if threads is not None:
         torch.set_num_threads(threads)
-    trainer = _trainer(
-        data, output / CHECKPOINT_NAME, resume, _settings_maker(minutes, images, seed, precision)
-    )
+    trainer = _trainer(data, output / CHECKPOINT_NAME, resume, settings)
     _run(trainer, output)
 
 

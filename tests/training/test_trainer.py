@@ -12,10 +12,13 @@ from frames import make_store
 from torch import nn
 from typer.testing import CliRunner
 
+import training.data.rendering
 import training.settings
+import training.train_command
 from training.averaging import AverageWeights
 from training.checkpoint import Checkpoint
 from training.data.batches import FramePool
+from training.data.rendering import RenderPlan
 from training.errors import CheckpointError, TrainingSettingsError
 from training.networks.depth_network import NetworkShape
 from training.precision import autocast, resolve_precision
@@ -230,4 +233,22 @@ def test_the_command_trains_and_refuses_to_overwrite(
 
 def test_a_run_has_one_length(tmp_path: Path) -> None:
     with pytest.raises(TrainingSettingsError, match="one length"):
-        train(data=tmp_path, output=tmp_path, render_seeds=0, minutes=1.0, images=5)
+        train(data=tmp_path, output=tmp_path, minutes=1.0, images=5)
+
+
+def test_the_command_renders_training_worlds_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    worlds: list[tuple[str, int]] = []
+
+    def remember(plan: RenderPlan, tell: object) -> int:
+        worlds.extend(plan.worlds())
+        make_store(plan.root, (("wall", 0),))
+        return 3
+
+    monkeypatch.setattr(training.data.rendering, "render_plan", remember)
+    monkeypatch.setattr(training.train_command, "_run", lambda trainer, output: None)
+    app = typer.Typer()
+    app.command()(train)
+    words = ["--data", str(tmp_path / "frames"), "--render", "--scenes", "wall,city", "--seeds", "2"]
+    done = CliRunner().invoke(app, [*words, "--output", str(tmp_path / "run")], catch_exceptions=False)
+    assert done.exit_code == 0
+    assert worlds == [("wall", 0), ("city", 0), ("wall", 1), ("city", 1)]
