@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import threading
 from typing import TYPE_CHECKING, Annotated
 
@@ -37,26 +38,29 @@ def watch(
     except ValueError as error:
         raise ConfigError(f"--connect: {error}") from error
     board, clock = Board(), MonotonicClock()
+    # Set by hand, since a program that a shell starts in the background inherits SIGINT as ignored.
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda _number, _frame: stop.set())
     with Listener(connect, board, clock):
-        try:
-            if once:
-                raise typer.Exit(0 if _show_once(board, clock, connect, timeout_s, as_json) else 1)
-            _show_live(board, clock, connect, period_s, as_json)
-        except KeyboardInterrupt:
-            raise typer.Exit(0) from None
+        if once:
+            raise typer.Exit(0 if _show_once(board, clock, connect, timeout_s, as_json, stop) else 1)
+        _show_live(board, clock, connect, period_s, as_json, stop)
 
 
-def _show_once(board: Board, clock: Clock, connect: str, timeout_s: float, as_json: bool) -> bool:
+def _show_once(
+    board: Board, clock: Clock, connect: str, timeout_s: float, as_json: bool, stop: threading.Event
+) -> bool:
     """Show the board as soon as a vehicle has scan and status, or at the time-out; whether one was heard."""
     from service.watch.view import board_json, render_board
 
     end_ns = clock.now_ns() + round(timeout_s * 1e9)
-    pause = threading.Event()
     while clock.now_ns() < end_ns:
         views = board.vehicles(clock.now_ns())
         if any(view.scan is not None and view.status is not None for view in views):
             break
-        pause.wait(0.05)
+        if stop.wait(0.05):
+            break
     now_ns = clock.now_ns()
     if as_json:
         typer.echo(board_json(board, now_ns))
@@ -67,18 +71,20 @@ def _show_once(board: Board, clock: Clock, connect: str, timeout_s: float, as_js
     return any(view.scan is not None or view.status is not None for view in board.vehicles(now_ns))
 
 
-def _show_live(board: Board, clock: Clock, connect: str, period_s: float, as_json: bool) -> None:
+def _show_live(
+    board: Board, clock: Clock, connect: str, period_s: float, as_json: bool, stop: threading.Event
+) -> None:
     from service.watch.view import board_json, render_board
 
-    pause = threading.Event()
     if as_json:
-        while True:
+        while not stop.is_set():
             typer.echo(board_json(board, clock.now_ns()))
-            pause.wait(period_s)
+            stop.wait(period_s)
+        return
     from rich.console import Console
     from rich.live import Live
 
     with Live(console=Console(), auto_refresh=False, screen=False) as live:
-        while True:
+        while not stop.is_set():
             live.update(render_board(board, connect, clock.now_ns()), refresh=True)
-            pause.wait(period_s)
+            stop.wait(period_s)

@@ -56,7 +56,8 @@ class Flown:
     """What came of a flight."""
 
     controller: Controller
-    furthest_north_m: float
+    norths_m: list[float]
+    """North of the origin, ten times a second from the first stick on."""
     messages: int
 
 
@@ -70,7 +71,8 @@ def fly(flavor: Flavor, street: Scene, seconds: float, *, seeing: bool = True) -
     sender = mavlink.MAVLink(None, srcSystem=1, srcComponent=196)
     receiver = mavlink.MAVLink(None)
     on_the_way: deque[tuple[float, bytes]] = deque()
-    messages, furthest_m, next_frame_s, index = 0, 0.0, 6.0, 0
+    norths_m: list[float] = []
+    messages, next_frame_s, index = 0, 6.0, 0
     while controller.now_s < 8.0 + seconds:
         if controller.now_s >= 8.0:
             if controller.mode != MODES[flavor]:
@@ -87,8 +89,9 @@ def fly(flavor: Flavor, street: Scene, seconds: float, *, seeing: bool = True) -
                 controller.obstacles(ObstacleWords.from_message(message))
                 messages += 1
         controller.step(STEP_S)
-        furthest_m = max(furthest_m, controller.vehicle.north_m)
-    return Flown(controller, furthest_m, messages)
+        if controller.now_s >= 8.0 + 0.1 * len(norths_m):
+            norths_m.append(controller.vehicle.north_m)
+    return Flown(controller, norths_m, messages)
 
 
 def look(
@@ -109,13 +112,14 @@ def look(
 class TestAStreetThatNoTrainingSaw:
     @pytest.mark.parametrize("flavor", ["ardupilot", "px4"])
     def test_the_vehicle_stops_before_the_facade(self, flavor: Flavor, street: Scene) -> None:
-        flown = fly(flavor, street, 18.0)
-        vehicle = flown.controller.vehicle
-        ahead_m = float(street.ray_distance_m(vehicle.position_ned_m, (1.0, 0.0, 0.0))[0])
+        flown = fly(flavor, street, 20.0)
+        facade_m = float(street.ray_distance_m((0.0, 0.0, -HEIGHT_M), (1.0, 0.0, 0.0))[0])
         assert not flown.controller.collided
-        assert flown.furthest_north_m > 10.0, "it must have flown"
-        assert abs(vehicle.velocity_north_mps) < 0.7
-        assert 1.0 < ahead_m < 15.0
+        assert max(flown.norths_m) > 12.0, "it must have flown"
+        assert max(flown.norths_m) < facade_m - 1.0
+        # The stick is still forward: ArduPilot backs off at up to 0.75 m/s and comes again.
+        last_5_s = flown.norths_m[-50:]
+        assert max(last_5_s) - min(last_5_s) < 3.5
         assert flown.messages > 150
 
     def test_the_same_flight_without_seeing_hits_it(self, street: Scene) -> None:
