@@ -1,4 +1,9 @@
-"""The depth network that ships: EfficientNet-Lite0, feature aggregation nodes, attention decoder."""
+"""The depth network that ships: EfficientNet-Lite0, feature aggregation nodes, attention decoder.
+
+3.33 M parameters; at 384x192 2.28 GFLOP (multiplications and additions): encoder 1.07, aggregation 0.32,
+decoder 0.73, heads 0.14. Full-width nodes at half resolution would cost more than all the rest, so that
+level has one depthwise node, and both heads answer there and are up-sampled once.
+"""
 
 from __future__ import annotations
 
