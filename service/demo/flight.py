@@ -6,7 +6,8 @@ import math
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from enum import Enum
@@ -28,9 +29,9 @@ from uavdepth.scenes import load_scene, parse_scene
 SERVICE_TIMEOUT_S = 180.0
 """Longest wait for the first OBSTACLE_DISTANCE: the very first run compiles the renderer's shading."""
 
-REST_MPS = 0.4
+REST_M = 0.8
 REST_S = 3.0
-"""The vehicle has stopped when it was slower than this for so long; backing away counts as coming to rest."""
+"""The vehicle has stopped when it stayed within so few metres for so long, the stick still forward."""
 
 FLEW_SHARE = 0.5
 ON_THE_WAY_M = 14.0
@@ -129,7 +130,7 @@ class DemoFlight:
         self.phase = Phase.FLYING
         start = self._autopilot.truth()
         pilot.fly_forward(self.plan.speed_mps)
-        flew, rest_since_s = False, math.inf
+        flew, track = False, deque[tuple[float, float, float]]()
         reason = f"still flying after {self.plan.seconds:g} s"
         truth = start
         stopped = False
@@ -146,9 +147,10 @@ class DemoFlight:
             if truth.collided:
                 reason = "hit something"
                 break
-            if not flew or speed_mps > REST_MPS:
-                rest_since_s = truth.time_s
-            elif truth.time_s - rest_since_s >= REST_S:
+            track.append((truth.time_s, *truth.position_ned_m[:2]))
+            while truth.time_s - track[0][0] > REST_S:
+                track.popleft()
+            if flew and _is_at_rest(track):
                 reason, stopped = "came to rest in front of it", True
                 break
         return self._report(scene, start, truth, flew=flew, stopped=stopped, reason=reason)
@@ -223,6 +225,13 @@ class DemoFlight:
 def _moment(observer: GroundObserver) -> Moment | None:
     pictures, scan = observer.pictures(), observer.scan
     return None if pictures is None or scan is None else Moment(pictures, scan)
+
+
+def _is_at_rest(track: Sequence[tuple[float, float, float]]) -> bool:
+    """Whether the vehicle stayed within `REST_M` for `REST_S`; the track is of time, north and east."""
+    times_s, norths_m, easts_m = zip(*track, strict=True)
+    reach_m = math.hypot(max(norths_m) - min(norths_m), max(easts_m) - min(easts_m))
+    return times_s[-1] - times_s[0] > REST_S - 0.2 and reach_m < REST_M
 
 
 def nearest_ahead_m(sample: ScanSample) -> float | None:

@@ -15,10 +15,10 @@ MARGIN_M = 4.0
 BELOW_M = 2.0
 ABOVE_M = 1.5
 PARAMETERS: dict[Flavor, dict[str, float]] = {
-    "ardupilot": {"AVOID_MARGIN": MARGIN_M, "PRX_FILT": 5.0},
+    "ardupilot": {"AVOID_MARGIN": MARGIN_M, "AVOID_BACKUP_SPD": 0.0, "PRX_FILT": 5.0},
     "px4": {"CP_DIST": MARGIN_M},
 }
-"""What the README asks a builder to set."""
+"""What the README asks a builder to set; without backing away, so that the vehicle comes to rest."""
 
 BLIND_PARAMETERS: dict[Flavor, dict[str, float]] = {
     # Without obstacle data ArduPilot does not even arm, and PX4 with Collision Prevention does not move.
