@@ -26,14 +26,10 @@ TIMES_S = np.arange(0.0, DURATION_S + 1e-9, 0.05)
 SEEDS = range(12)
 
 
-class _Extent:
-    extent_m = 60.0
-
-
 class Balls:
     """A world of floating balls over flat ground, solved exactly."""
 
-    description = _Extent()
+    extent_m = 60.0
 
     def __init__(self, count: int = 150, largest_m: float = 3.0) -> None:
         rng = np.random.default_rng(5)

@@ -152,7 +152,7 @@ def atlas() -> TextureAtlas:
 def _level(atlas: TextureAtlas, number: int) -> NDArray[np.float64]:
     """(S, S, 4) finest level of a texture, 0 to 1."""
     side = 1 << (int(atlas.levels[number]) - 1)
-    packed = atlas.texels[atlas.start[number] : atlas.start[number] + side * side]
+    packed = atlas.pyramids[number][: side * side]
     return np.stack([packed >> shift & 255 for shift in (0, 8, 16, 24)], -1).reshape(side, side, 4) / 255.0
 
 
@@ -163,7 +163,7 @@ def _lookup(
     a: tuple[float, float],
     b: tuple[float, float],
 ) -> NDArray[np.float64]:
-    values = filtered(atlas.texels, atlas.start[number], atlas.levels[number], *place, *a, *b)
+    values = filtered(atlas.address[number], atlas.levels[number], *place, *a, *b)
     blue, green, red, gloss = values
     return np.array([blue, green, red, gloss])
 

@@ -73,8 +73,8 @@ def test_the_end_is_a_front_20_m_wide_and_9_m_high_square_to_the_street(scene: S
 
 def test_ground_height_agrees_with_rays_on_bare_ground(scene: Scene) -> None:
     rng = np.random.default_rng(1)
-    places = rng.uniform(-0.9, 0.9, (800, 2)) * scene.description.extent_m
-    ground = scene.description.ground_height_m(places[:, 0], places[:, 1])
+    places = rng.uniform(-0.9, 0.9, (800, 2)) * scene.extent_m
+    ground = scene.ground_heights_m(places[:, 0], places[:, 1])
     outside = np.array(
         [scene.clearance_m((n, e, -(g + 0.3))) > 0 for (n, e), g in zip(places, ground, strict=True)]
     )
@@ -139,5 +139,5 @@ def test_another_process_renders_the_same_picture_to_the_bit() -> None:
 def test_seeds_of_the_city_differ_in_plan_and_light() -> None:
     worlds = [_loaded(name, seed) for name, seed in WORLDS if name == "city"]
     ends = {round(float(world.ray_distance_m((0.0, 0.0, -3.0), NORTH)[0]), 2) for world in worlds}
-    suns = {tuple(np.round(world.description.sun_direction_ned, 3)) for world in worlds}
+    suns = {tuple(np.round(world.sun_direction_ned, 3)) for world in worlds}
     assert len(ends) == len(suns) == len(worlds) == 2

@@ -6,6 +6,7 @@ import importlib
 
 from uavdepth.errors import SceneError
 from uavdepth.scenes.description import SceneDescription
+from uavdepth.scenes.heap import trim_heap
 from uavdepth.scenes.picture import RenderedPicture
 from uavdepth.scenes.scene import Scene
 
@@ -34,7 +35,10 @@ def load_scene(name: str, seed: int = 0) -> Scene:
         raise SceneError(f"scene seed is {seed}: 0 or above is needed")
     module = importlib.import_module(f"uavdepth.scenes.{name}")
     description: SceneDescription = module.build(seed)
-    return Scene(name, seed, description)
+    scene = Scene(name, seed, description)
+    del description
+    trim_heap()
+    return scene
 
 
 def parse_scene(spec: str) -> tuple[str, int]:

@@ -84,6 +84,7 @@ class EmbreeTriangles:
         faces: (M, 3) int32 vertex numbers, all in range.
 
     Attributes:
+        vertices_m: (N, 3) float32, the copy that Embree reads.
         handle: the RTCScene.
         intersect, occluded: addresses of rtcIntersect16 and rtcOccluded16.
         coherent, incoherent: addresses of query arguments for neighbouring and for unrelated rays.
@@ -98,14 +99,14 @@ class EmbreeTriangles:
         self._library = library
         self._device = _device()
         # Embree reads both in place, and the last vertex with a load of 16 bytes.
-        self._vertices = np.zeros((len(vertices_m) + 1, 3), np.float32)
-        self._vertices[:-1] = vertices_m
+        self.vertices_m = np.zeros((len(vertices_m) + 1, 3), np.float32)[:-1]
+        self.vertices_m[:] = vertices_m
         self._faces = np.ascontiguousarray(faces, np.int32)
         self.handle = int(library.rtcNewScene(self._device))
         library.rtcSetSceneFlags(self.handle, _SCENE_ROBUST)
         geometry = library.rtcNewGeometry(self._device, _TRIANGLES)
         for kind, form, items, count in (
-            (_VERTEX_BUFFER, _FORMAT_FLOAT3, self._vertices, len(vertices_m)),
+            (_VERTEX_BUFFER, _FORMAT_FLOAT3, self.vertices_m, len(vertices_m)),
             (_INDEX_BUFFER, _FORMAT_UINT3, self._faces, len(faces)),
         ):
             library.rtcSetSharedGeometryBuffer(geometry, kind, 0, form, items.ctypes.data, 0, 12, count)

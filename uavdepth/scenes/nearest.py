@@ -9,15 +9,18 @@ from numpy.typing import NDArray
 
 from uavdepth.scenes.kernels import kernel
 
-_BLOCK = 32
+_BLOCK = 16
 """Triangles in a block: few enough that their common box is tight, many enough that boxes are few."""
+
+_GROUP = 32
+"""Blocks in a group, which has a box too."""
 
 _CELLS = 1 << 10
 """Steps along each axis of the curve that brings neighbouring triangles together."""
 
 
 class NearestSurface:
-    """The triangles of one mesh in blocks of neighbours, for distances from points to the nearest one.
+    """The triangles of one mesh in groups of blocks of neighbours, to find the one nearest to a point.
 
     Args:
         vertices_m: (N, 3) float32.
@@ -33,11 +36,24 @@ class NearestSurface:
         first = np.arange(0, len(faces), _BLOCK)
         self._low = np.minimum.reduceat(low[self._order], first)
         self._high = np.maximum.reduceat(high[self._order], first)
+        first = np.arange(0, len(self._low), _GROUP)
+        self._group_low = np.minimum.reduceat(self._low, first)
+        self._group_high = np.maximum.reduceat(self._high, first)
 
     def distance_m(self, point_m: NDArray[np.float64], limit_m: float) -> float:
         """Metres from a (3,) point to the nearest triangle, or `limit_m` when none is nearer."""
         return float(
-            _nearest(point_m, self._vertices, self._faces, self._order, self._low, self._high, limit_m)
+            _nearest(
+                point_m,
+                self._vertices,
+                self._faces,
+                self._order,
+                self._low,
+                self._high,
+                self._group_low,
+                self._group_high,
+                limit_m,
+            )
         )
 
 
@@ -57,33 +73,44 @@ def _neighbours_together(low: NDArray[np.float32], high: NDArray[np.float32]) ->
 
 
 @kernel
-def _nearest(point, vertices, faces, order, low, high, limit):  # type: ignore[no-untyped-def]
+def _nearest(point, vertices, faces, order, low, high, group_low, group_high, limit):  # type: ignore[no-untyped-def]
     """Distance from `point` to the nearest triangle, at most `limit`.
 
     Args:
         point: (3,) float64. vertices: (N, 3) float32. faces: (M, 3) int32.
         order: (M,) int32 faces block by block. low, high: (B, 3) float32 boxes of the blocks.
+        group_low, group_high: (G, 3) float32 boxes of the groups.
     """
     best = limit * limit
-    gaps = np.empty(len(low), np.float64)
+    gaps = np.empty(len(group_low), np.float64)
     nearest = 0
-    for block in range(len(low)):
-        gap = 0.0
-        for axis in range(3):
-            away = max(low[block, axis] - point[axis], point[axis] - high[block, axis], 0.0)
-            gap += away * away
-        gaps[block] = gap
-        if gap < gaps[nearest]:
-            nearest = block
+    for group in range(len(group_low)):
+        gaps[group] = _gap(point, group_low, group_high, group)
+        if gaps[group] < gaps[nearest]:
+            nearest = group
     # The nearest box first: its triangles rule out almost all others.
-    for turn in range(-1, len(low)):
-        block = nearest if turn < 0 else turn
-        if gaps[block] < best:
+    for turn in range(-1, len(group_low)):
+        group = nearest if turn < 0 else turn
+        if gaps[group] >= best:
+            continue
+        for block in range(group * _GROUP, min((group + 1) * _GROUP, len(low))):
+            if _gap(point, low, high, block) >= best:
+                continue
             for place in range(block * _BLOCK, min((block + 1) * _BLOCK, len(order))):
                 f = order[place]
                 a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
                 best = min(best, _squared(point, a, b, c))
     return math.sqrt(best)
+
+
+@kernel
+def _gap(point, low, high, number):  # type: ignore[no-untyped-def]
+    """Squared distance from a point to a box, 0 inside."""
+    gap = 0.0
+    for axis in range(3):
+        away = max(low[number, axis] - point[axis], point[axis] - high[number, axis], 0.0)
+        gap += away * away
+    return gap
 
 
 @kernel

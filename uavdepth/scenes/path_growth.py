@@ -35,18 +35,11 @@ _AROUND = np.array(
 _HEADINGS = np.arange(24) * (2 * math.pi / 24)
 
 
-class Extent(Protocol):
-    """How far a scene goes."""
-
-    @property
-    def extent_m(self) -> float: ...
-
-
 class World(Protocol):
     """What the planner asks a scene."""
 
     @property
-    def description(self) -> Extent: ...
+    def extent_m(self) -> float: ...
     def ground_height_m(self, north_m: float, east_m: float) -> float: ...
     def ray_distance_m(self, origin_ned_m: ArrayLike, direction_ned: ArrayLike) -> NDArray[np.floating]: ...
     def clearance_m(self, position_ned_m: Sequence[float]) -> float: ...
@@ -99,7 +92,7 @@ class PathGrower:
         self._world = world
         self._rng = rng
         self._habit = Habit.draw(rng)
-        self._reach = 0.9 * world.description.extent_m
+        self._reach = 0.9 * world.extent_m
         self._goal_rad = 0.0
         self._goal_age = 0
 

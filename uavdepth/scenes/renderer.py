@@ -37,7 +37,7 @@ class Renderer:
 
     def __init__(self, description: SceneDescription, seed: int) -> None:
         mesh = description.mesh
-        self._mesh = mesh
+        self._faces = mesh.faces
         self._tracer = RayTracer(mesh)
         self._atlas = build_atlas(mesh.texture_names, seed)
         self._light = light_table(description)
@@ -45,7 +45,7 @@ class Renderer:
         self._macro = cloud_noise(np.random.default_rng([seed, 8]), 256, slope=1.2, coarsest=1.0, finest=60.0)
         self._table = build_face_table(mesh, self._atlas.per_metre)
         self._vertex_normals = vertex_normals(mesh)
-        self._nearest = NearestSurface(mesh.vertices_m, mesh.faces)
+        self._nearest = NearestSurface(self._tracer.vertices_m, mesh.faces)
         # Exposed so that a white surface in full sun is white, as a camera would meter the scene.
         brightest = 0.8 * np.mean(description.sun_bgr) + np.mean(description.ambient_bgr)
         self._exposure = float(1.15 / brightest)
@@ -125,7 +125,7 @@ class Renderer:
             hits.v,
             hits.t,
             self._table,
-            self._mesh.faces,
+            self._faces,
             self._vertex_normals,
             self._light[0],
         )
@@ -140,8 +140,7 @@ class Renderer:
             lit,
             pixel,
             self._table,
-            atlas.texels,
-            atlas.start,
+            atlas.address,
             atlas.levels,
             self._light,
             self._clouds,

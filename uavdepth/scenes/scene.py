@@ -28,7 +28,11 @@ class Scene:
     Args:
         name: what the scene is called.
         seed: which variant of it.
-        description: mesh, light and air.
+        description: mesh, light and air. What rendering does not need of it is not kept.
+
+    Attributes:
+        extent_m: half the side of the square around the origin that is worth flying in.
+        sun_direction_ned: (3,) unit vector towards the sun.
 
     Raises:
         SceneError: embreex or numba is not installed.
@@ -37,7 +41,9 @@ class Scene:
     def __init__(self, name: str, seed: int, description: SceneDescription) -> None:
         self.name = name
         self.seed = seed
-        self.description = description
+        self.extent_m = description.extent_m
+        self.sun_direction_ned = description.sun_direction_ned
+        self._ground_height_m = description.ground_height_m
         self._renderer = _load_renderer(description, seed)
 
     def render(
@@ -64,7 +70,11 @@ class Scene:
 
     def ground_height_m(self, north_m: float, east_m: float) -> float:
         """Height of the bare ground in metres, up positive."""
-        return float(self.description.ground_height_m(north_m, east_m))
+        return float(self._ground_height_m(north_m, east_m))
+
+    def ground_heights_m(self, north_m: ArrayLike, east_m: ArrayLike) -> NDArray[np.float64]:
+        """Heights of the bare ground in metres, up positive, at many places (any equal shapes)."""
+        return self._ground_height_m(north_m, east_m)
 
     def rangefinder_m(self, position_ned_m: Sequence[float]) -> float | None:
         """Metres straight down to the first surface of anything, or None when nothing is below."""

@@ -107,7 +107,7 @@ def surfaces(origin, directions, order, face, u, v, t, table, corners, vertex_no
 
 @kernel
 def shade(  # type: ignore[no-untyped-def]
-    origin, directions, face, t, normals, lit, pixel, table, texels, start, levels, light, clouds, macro
+    origin, directions, face, t, normals, lit, pixel, table, texels, levels, light, clouds, macro
 ):
     """(N, 3) float32 linear colour of each ray.
 
@@ -115,7 +115,8 @@ def shade(  # type: ignore[no-untyped-def]
         origin: (3,) NED. directions: (N, 3), length such that t is depth. face, t: hits.
         normals: from `surfaces`. lit: (N,) whether the sun reaches the hit.
         pixel: angle of a pixel in radians.
-        table: (M, 16) from `build_face_table`. texels, start, levels: of a `TextureAtlas`.
+        table: (M, 16) from `build_face_table`. texels, levels: address and levels of a
+            `TextureAtlas`.
         light, clouds, macro: `light_table`, `cloud_map`, tileable brightness variation.
     """
     out = np.empty((len(face), 3), np.float32)
@@ -173,7 +174,7 @@ def shade(  # type: ignore[no-untyped-def]
             x = g[U] * pn + g[U + 1] * pe + g[U + 2] * pd + g[U + 3]
             y = g[V] * pn + g[V + 1] * pe + g[V + 2] * pd + g[V + 3]
             k = int(g[TEXTURE])
-            blue, green, red, gloss = filtered(texels, start[k], levels[k], x, y, au, av, bu, bv)
+            blue, green, red, gloss = filtered(texels[k], levels[k], x, y, au, av, bu, bv)
 
             vary = one + _MACRO_CONTRAST * wrapped_bilinear(
                 macro, (pn + _LEAN_NORTH * pd) * macro_scale, (pe + _LEAN_EAST * pd) * macro_scale

@@ -7,8 +7,12 @@ weights of 8 bits, as graphics hardware does it.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+from llvmlite import ir  # type: ignore[import-untyped]
+from numba import types
+from numba.extending import intrinsic
 
 from uavdepth.scenes.kernels import kernel
 
@@ -33,10 +37,23 @@ _LOW = np.uint64(0xFFFFFFFF)
 _HIGH = np.uint64(32)
 
 
+def _read(typingctx, address, number):  # type: ignore[no-untyped-def]
+    """The uint32 of that number from an address on."""
+
+    def generate(context, builder, _, values):  # type: ignore[no-untyped-def]
+        first = builder.inttoptr(values[0], ir.IntType(32).as_pointer())
+        return builder.load(builder.gep(first, [values[1]]))
+
+    return types.uint32(types.intp, types.intp), generate
+
+
+_texel: Any = intrinsic(_read)
+
+
 @kernel
 def _lanes(texels, at):  # type: ignore[no-untyped-def]
     """One texel's channels in 16-bit lanes, from low to high blue, red, green, gloss."""
-    packed = np.uint64(texels[np.uint64(at)])
+    packed = np.uint64(_texel(texels, at))
     return (packed | (packed << _TO_HIGH)) & _BYTES
 
 
@@ -80,11 +97,15 @@ def _along(texels, base, shift, x, y, step_x, step_y, samples):  # type: ignore[
 
 
 @kernel
-def filtered(texels, start, levels, x, y, ax, ay, bx, by):  # type: ignore[no-untyped-def]
+def filtered(texels, levels, x, y, ax, ay, bx, by):  # type: ignore[no-untyped-def]
     """Texture averaged over the parallelogram of half axes a/2, b/2 around x, y (in repetitions).
 
     Samples are spread along the longer axis and each is filtered trilinearly with the shorter one, as
     graphics hardware does anisotropic filtering. Returns blue, green, red, gloss, 0 to 1.
+
+    Args:
+        texels, levels: address and number of levels of a pyramid in a `TextureAtlas`.
+        x, y, ax, ay, bx, by: float32.
     """
     long = math.sqrt(ax * ax + ay * ay)
     short = math.sqrt(bx * bx + by * by)
@@ -102,7 +123,7 @@ def filtered(texels, start, levels, x, y, ax, ay, bx, by):  # type: ignore[no-un
     part = np.float32(lod - low)
 
     shift = top - low
-    base = start + ((1 << (2 * top)) - (1 << (2 * shift))) * 4 // 3
+    base = ((1 << (2 * top)) - (1 << (2 * shift))) * 4 // 3
     scale = float(1 << (shift + _POINT))
     back = 0.5 / samples - 0.5
     px = int((x - math.floor(x) + ax * back) * scale)

@@ -42,6 +42,11 @@ class RayTracer:
     def __init__(self, mesh: Mesh) -> None:
         self._triangles = EmbreeTriangles(mesh.vertices_m, mesh.faces)
 
+    @property
+    def vertices_m(self) -> NDArray[np.float32]:
+        """(N, 3) float32, the mesh's vertices."""
+        return self._triangles.vertices_m
+
     def nearest(
         self,
         origins_m: NDArray[np.float32],
