@@ -21,6 +21,7 @@ def benchmark(
     """Measure speed and memory on this machine: each step on one core, then the whole program."""
     from service.benchmark.pictures import render_pictures
     from service.benchmark.program import measure_program
+    from service.benchmark.rendering import measure_rendering
     from service.benchmark.stages import measure_stages
 
     pictures = render_pictures(_PICTURES)
@@ -30,12 +31,13 @@ def benchmark(
         "size": "640x320",
         "stages_ms": asdict(measure_stages(model, pictures)),
         "program": asdict(measure_program(model, pictures[: _PICTURES // 2], seconds)),
+        "rendering_384x192_ms": measure_rendering(),
     }
     if as_json:
         typer.echo(json.dumps(result))
         return
     typer.echo(f"{result['machine']}, {result['date']}, {result['size']}")
-    for part in ("stages_ms", "program"):
+    for part in ("stages_ms", "program", "rendering_384x192_ms"):
         typer.echo(part)
         for name, value in result[part].items():
             typer.echo(f"  {name:<18} {value}")
