@@ -149,10 +149,12 @@ def atlas() -> TextureAtlas:
     return build_atlas(TEXTURES, 0)
 
 
-def _level(atlas: TextureAtlas, number: int) -> NDArray[np.float64]:
-    """(S, S, 4) finest level of a texture, 0 to 1."""
-    side = 1 << (int(atlas.levels[number]) - 1)
-    packed = atlas.pyramids[number][: side * side]
+def _level(atlas: TextureAtlas, number: int, level: int = 0) -> NDArray[np.float64]:
+    """(S, S, 4) one level of a texture, 0 to 1; 0 is the finest."""
+    sides = [1 << exponent for exponent in reversed(range(int(atlas.levels[number])))]
+    start = sum(side * side for side in sides[:level])
+    side = sides[level]
+    packed = atlas.pyramids[number][start : start + side * side]
     return np.stack([packed >> shift & 255 for shift in (0, 8, 16, 24)], -1).reshape(side, side, 4) / 255.0
 
 
@@ -168,21 +170,48 @@ def _lookup(
     return np.array([blue, green, red, gloss])
 
 
+def _between(level: NDArray[np.float64], x: float, y: float) -> NDArray[np.float64]:
+    """Bilinear between the four texels around x, y in repetitions."""
+    side = len(level)
+    px, py = x * side - 0.5, y * side - 0.5
+    ax, ay = px - math.floor(px), py - math.floor(py)
+    x0, y0 = math.floor(px) % side, math.floor(py) % side
+    x1, y1 = (x0 + 1) % side, (y0 + 1) % side
+    top = level[y0, x0] * (1 - ax) + level[y0, x1] * ax
+    bottom = level[y1, x0] * (1 - ax) + level[y1, x1] * ax
+    return np.asarray(top * (1 - ay) + bottom * ay)
+
+
 @pytest.mark.parametrize("number", range(len(TEXTURES)))
 def test_a_small_footprint_reads_between_the_four_texels_around_it(atlas: TextureAtlas, number: int) -> None:
     level = _level(atlas, number)
     side = len(level)
     rng = np.random.default_rng(3)
     for x, y in [(0.0, 0.0), (-3.2, 7.9), *rng.uniform(-2.0, 2.0, (50, 2))]:
-        px, py = x * side - 0.5, y * side - 0.5
-        ax, ay = px - math.floor(px), py - math.floor(py)
-        x0, y0 = math.floor(px) % side, math.floor(py) % side
-        x1, y1 = (x0 + 1) % side, (y0 + 1) % side
-        top = level[y0, x0] * (1 - ax) + level[y0, x1] * ax
-        bottom = level[y1, x0] * (1 - ax) + level[y1, x1] * ax
         tiny = 0.01 / side
         found = _lookup(atlas, number, (x, y), (tiny, 0.0), (0.0, tiny))
-        np.testing.assert_allclose(found, top * (1 - ay) + bottom * ay, atol=2.0 / 255)
+        np.testing.assert_allclose(found, _between(level, x, y), atol=2.0 / 255)
+
+
+@pytest.mark.parametrize("texels", [1.9, 3.0, 6.3, 40.0])
+def test_a_larger_footprint_reads_between_two_levels(atlas: TextureAtlas, texels: float) -> None:
+    exact = math.log2(texels) - 0.3  # the renderer takes levels a little finer than the footprint
+    low = int(exact)
+    finer, coarser = _level(atlas, 0, low), _level(atlas, 0, low + 1)
+    width = texels / len(_level(atlas, 0))
+    for x, y in np.random.default_rng(7).uniform(-2.0, 2.0, (50, 2)):
+        expected = _between(finer, x, y) * (1 - exact + low) + _between(coarser, x, y) * (exact - low)
+        found = _lookup(atlas, 0, (x, y), (width, 0.0), (0.0, width))
+        np.testing.assert_allclose(found, expected, atol=2.0 / 255)
+
+
+def test_which_axis_of_a_footprint_is_the_longer_one_does_not_matter(atlas: TextureAtlas) -> None:
+    texel = 1.0 / len(_level(atlas, 0))
+    long, short = (3 * texel, 7 * texel), (1.4 * texel, -0.6 * texel)
+    for x, y in np.random.default_rng(8).uniform(0.0, 1.0, (20, 2)):
+        np.testing.assert_array_equal(
+            _lookup(atlas, 0, (x, y), long, short), _lookup(atlas, 0, (x, y), short, long)
+        )
 
 
 @pytest.mark.parametrize("number", range(len(TEXTURES)))
