@@ -80,13 +80,14 @@ def _distance(mesh: Mesh, p: NDArray[np.float64]) -> float:
     return float(np.where(above, height, sides).min())
 
 
+@pytest.mark.parametrize("packet", [4, 8, 16])
 @pytest.mark.parametrize("rays", [1, 15, 16, 17, 500])
-def test_rays_find_the_first_triangle_whatever_their_number_and_order(rays: int) -> None:
+def test_rays_find_the_first_triangle_whatever_their_number_and_order(rays: int, packet: int) -> None:
     mesh = _soup(300, seed=4)
     rng = np.random.default_rng(rays)
     origin = np.array([1.0, -2.0, 3.0])
     directions = (np.array([1.0, 0.2, -0.1]) + 0.4 * rng.normal(size=(rays, 3))).astype(np.float32)
-    tracer = RayTracer(mesh)
+    tracer = RayTracer(mesh, packet)
     expected = _first_hits(mesh, origin, directions.astype(float))
     for order in (None, np.arange(rays, dtype=np.int32), rng.permutation(rays).astype(np.int32)):
         hits = tracer.nearest(origin.astype(np.float32), directions, order)
@@ -108,13 +109,14 @@ def test_some_rays_hit_and_some_miss_so_that_the_comparison_means_something() ->
     assert 0.2 < hit.mean() < 0.98
 
 
+@pytest.mark.parametrize("packet", [4, 8, 16])
 @pytest.mark.parametrize("points", [0, 1, 16, 333])
-def test_a_point_is_in_shadow_when_a_ray_towards_the_sun_hits_anything(points: int) -> None:
+def test_a_point_is_in_shadow_when_a_ray_towards_the_sun_hits_anything(points: int, packet: int) -> None:
     mesh = _soup(300, seed=5)
     rng = np.random.default_rng(6)
     origins = rng.uniform(-20.0, 20.0, (points, 3)).astype(np.float32)
     sun = np.array([0.3, -0.4, -0.8660254], np.float32)
-    tracer = RayTracer(mesh)
+    tracer = RayTracer(mesh, packet)
     hits = tracer.nearest(origins, np.tile(sun, (points, 1)))
     np.testing.assert_array_equal(tracer.occluded(origins, sun), np.isfinite(hits.t))
 

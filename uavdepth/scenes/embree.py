@@ -1,7 +1,7 @@
 """Embree 4 through its C interface, in the library that the embreex wheel carries.
 
-embreex itself offers one ray a call. Packets of 16 neighbouring rays go through the same tree about three
-times as fast, and rays from a camera or towards the sun are neighbours by nature.
+embreex itself offers one ray a call. Packets of 16 neighbouring rays (8 without AVX-512) go through the same
+tree about three times as fast, and rays from a camera or towards the sun are neighbours by nature.
 
 Source of every structure and constant: the Embree 4 API reference and its headers rtcore_*.h.
 """
@@ -21,11 +21,8 @@ from numpy.typing import NDArray
 
 from uavdepth.errors import SceneError
 
-PACKET = 16
-"""Rays in one call."""
-
 RAY_HIT_ROWS = 21
-"""Rows of PACKET 32-bit numbers in an RTCRayHit16; the first 12 are its RTCRay16."""
+"""Rows of 32-bit numbers, one a ray, in an RTCRayHit4, 8 or 16; the first 12 are its rays."""
 
 _ALIGNMENT = 64
 _SCENE_ROBUST = 1 << 2
@@ -34,6 +31,8 @@ _TRIANGLES = 0
 _INDEX_BUFFER, _VERTEX_BUFFER = 0, 1
 _FORMAT_UINT3, _FORMAT_FLOAT3 = 0x5003, 0x9003
 _DEVICE_VERSION = 0
+_NATIVE_PACKETS = {16: 34, 8: 33, 4: 32}
+"""Device property that tells whether the processor takes packets of so many rays as they are."""
 
 _POINTER = ctypes.c_void_p
 _SIGNATURES: dict[str, tuple[object, tuple[object, ...]]] = {
@@ -82,11 +81,13 @@ class EmbreeTriangles:
     Args:
         vertices_m: (N, 3) float32.
         faces: (M, 3) int32 vertex numbers, all in range.
+        packet: rays in one call, 4, 8 or 16; None takes what suits the processor.
 
     Attributes:
         vertices_m: (N, 3) float32, the copy that Embree reads.
         handle: the RTCScene.
-        intersect, occluded: addresses of rtcIntersect16 and rtcOccluded16.
+        packet: rays in one call.
+        intersect, occluded: addresses of rtcIntersect and rtcOccluded for so many rays.
         coherent, incoherent: addresses of query arguments for neighbouring and for unrelated rays.
 
     Raises:
@@ -94,7 +95,9 @@ class EmbreeTriangles:
             or reports an error.
     """
 
-    def __init__(self, vertices_m: NDArray[np.float32], faces: NDArray[np.int32]) -> None:
+    def __init__(
+        self, vertices_m: NDArray[np.float32], faces: NDArray[np.int32], packet: int | None = None
+    ) -> None:
         library = _library()
         self._library = library
         self._device = _device()
@@ -117,8 +120,9 @@ class EmbreeTriangles:
         error = library.rtcGetDeviceError(self._device)
         if error:
             raise SceneError(f"Embree reports error {error} for a mesh of {len(faces)} triangles")
-        self.intersect = _address(library.rtcIntersect16)
-        self.occluded = _address(library.rtcOccluded16)
+        self.packet = _packet() if packet is None else packet
+        self.intersect = _address(f"rtcIntersect{self.packet}")
+        self.occluded = _address(f"rtcOccluded{self.packet}")
         everything = 0xFFFFFFFF
         self._arguments = (
             _QueryArguments(_RAYS_COHERENT, everything, None, None, None),
@@ -131,16 +135,16 @@ class EmbreeTriangles:
             self._library.rtcReleaseScene(self.handle)
 
 
-def aligned_rows(rows: int) -> NDArray[np.float32]:
-    """(rows, PACKET) float32 zeros at an address that Embree's packet calls accept."""
-    size = rows * PACKET * 4
+def aligned_rows(rows: int, packet: int) -> NDArray[np.float32]:
+    """(rows, packet) float32 zeros at an address that Embree's packet calls accept."""
+    size = rows * packet * 4
     room = np.zeros(size + _ALIGNMENT, np.uint8)
     skip = -room.ctypes.data % _ALIGNMENT
-    return room[skip : skip + size].view(np.float32).reshape(rows, PACKET)
+    return room[skip : skip + size].view(np.float32).reshape(rows, packet)
 
 
 def _call_packet(typingctx, function, valid, scene, packet, arguments):  # type: ignore[no-untyped-def]
-    """Call rtcIntersect16 or rtcOccluded16, from compiled code, all by address.
+    """Call rtcIntersect or rtcOccluded for a packet, from compiled code, all by address.
 
     An address that is an argument, unlike a ctypes function, lets Numba keep the compiled code on disk.
     """
@@ -188,8 +192,18 @@ def _device() -> int:
     return int(device)
 
 
-def _address(function: object) -> int:
-    address = ctypes.cast(function, _POINTER).value  # type: ignore[arg-type]
+@lru_cache(maxsize=1)
+def _packet() -> int:
+    library, device = _library(), _device()
+    for packet, native in _NATIVE_PACKETS.items():
+        if library.rtcGetDeviceProperty(device, native):
+            return packet
+    return min(_NATIVE_PACKETS)
+
+
+def _address(name: str) -> int:
+    function = getattr(_library(), name, None)
+    address = None if function is None else ctypes.cast(function, _POINTER).value
     if address is None:
-        raise SceneError("Embree's library lacks its packet queries")
+        raise SceneError(f"Embree's library has no {name}")
     return address

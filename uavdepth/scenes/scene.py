@@ -137,7 +137,7 @@ def _load_renderer(description: SceneDescription, seed: int) -> Renderer:
         except ImportError as error:
             raise SceneError(
                 f"rendered scenes need the package {package}, which is not here ({error}): "
-                "pip install 'uavdepth[sim]' (embreex has wheels for x86-64 only)"
+                "pip install 'uavdepth[sim]' (embreex has wheels for x86-64, and for macOS on arm64)"
             ) from error
     from uavdepth.scenes.renderer import Renderer
 

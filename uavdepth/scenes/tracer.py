@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uavdepth.scenes.embree import PACKET, RAY_HIT_ROWS, EmbreeTriangles, aligned_rows, call_packet
+from uavdepth.scenes.embree import RAY_HIT_ROWS, EmbreeTriangles, aligned_rows, call_packet
 from uavdepth.scenes.kernels import kernel
 from uavdepth.scenes.mesh import Mesh
 
 _ORIGIN, _NEAR, _DIRECTION, _TIME, _FAR, _MASK, _ID, _FLAGS = 0, 3, 4, 7, 8, 9, 10, 11
 _U, _V, _FACE, _GEOMETRY = 15, 16, 17, 18
-"""Rows of an RTCRayHit16."""
+"""Rows of an RTCRayHit4, 8 or 16."""
 
 
 @dataclass(frozen=True)
@@ -35,12 +35,13 @@ class Hits:
 class RayTracer:
     """The triangles of one mesh, ready for rays.
 
-    `order` of its methods: (N,) int32, the sequence in which rays are taken, 16 at a time. Rays that start
-    and lead close together should follow each other. Answers come in the order of the arguments.
+    Args:
+        mesh: the triangles.
+        packet: rays traced at a time, 4, 8 or 16; None takes what suits the processor.
     """
 
-    def __init__(self, mesh: Mesh) -> None:
-        self._triangles = EmbreeTriangles(mesh.vertices_m, mesh.faces)
+    def __init__(self, mesh: Mesh, packet: int | None = None) -> None:
+        self._triangles = EmbreeTriangles(mesh.vertices_m, mesh.faces, packet)
 
     @property
     def vertices_m(self) -> NDArray[np.float32]:
@@ -58,7 +59,9 @@ class RayTracer:
         Args:
             origins_m: (N, 3) or (3,) float32 NED; one origin serves all rays.
             directions: (N, 3) float32, any length above 0.
-            order: the rays are neighbours in this order; None: they have nothing in common.
+            order: (N,) int32 sequence in which rays that start and lead close together follow each other,
+                which makes them quick; None where they have nothing in common. Answers come in the order
+                of the directions all the same.
         """
         count = len(directions)
         hits = Hits(
@@ -75,7 +78,7 @@ class RayTracer:
             _rows(origins_m),
             _rows(directions),
             np.arange(count, dtype=np.int32) if order is None else order,
-            *_packet(),
+            *_packet(triangles.packet),
             hits.face,
             hits.u,
             hits.v,
@@ -94,16 +97,16 @@ class RayTracer:
             triangles.coherent,
             _rows(origins_m),
             np.asarray(direction, np.float32),
-            *_packet(),
+            *_packet(triangles.packet),
             stopped,
         )
         return stopped
 
 
-def _packet() -> tuple[int, NDArray[np.float32], NDArray[np.int32], int]:
-    """An empty RTCRayHit16: address, its rows as float32 and as int32; and the address of one more row, which
-    says with -1 which of its rays are valid."""
-    rows = aligned_rows(RAY_HIT_ROWS + 1)
+def _packet(packet: int) -> tuple[int, NDArray[np.float32], NDArray[np.int32], int]:
+    """An empty RTCRayHit of so many rays: its address, its rows as float32 and as int32, and the address of
+    one more row, which says with -1 which of its rays are valid."""
+    rows = aligned_rows(RAY_HIT_ROWS + 1, packet)
     return rows.ctypes.data, rows, rows.view(np.int32), rows[RAY_HIT_ROWS:].ctypes.data
 
 
@@ -115,9 +118,10 @@ def _rows(vectors: NDArray[np.float32]) -> NDArray[np.float32]:
 def _intersect(call, scene, arguments, origins, directions, order, at, packet, numbers, valid, face, u, v, t):  # type: ignore[no-untyped-def]
     """Fill face, u, v, t for all rays. at, packet, numbers, valid: from `_packet`."""
     shared = len(origins) == 1
-    for first in range(0, len(order), PACKET):
-        width = min(PACKET, len(order) - first)
-        for k in range(PACKET):
+    most = packet.shape[1]
+    for first in range(0, len(order), most):
+        width = min(most, len(order) - first)
+        for k in range(most):
             numbers[RAY_HIT_ROWS, k] = -1 if k < width else 0
             i = order[first + min(k, width - 1)]
             j = 0 if shared else i
@@ -145,9 +149,10 @@ def _intersect(call, scene, arguments, origins, directions, order, at, packet, n
 @kernel
 def _occlude(call, scene, arguments, origins, direction, at, packet, numbers, valid, stopped):  # type: ignore[no-untyped-def]
     """Fill stopped for all rays. at, packet, numbers, valid: from `_packet`."""
-    for first in range(0, len(origins), PACKET):
-        width = min(PACKET, len(origins) - first)
-        for k in range(PACKET):
+    most = packet.shape[1]
+    for first in range(0, len(origins), most):
+        width = min(most, len(origins) - first)
+        for k in range(most):
             numbers[RAY_HIT_ROWS, k] = -1 if k < width else 0
             i = first + min(k, width - 1)
             for axis in range(3):
