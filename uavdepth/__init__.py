@@ -23,6 +23,7 @@ from uavdepth.depth_picture import DepthPictureInfo
 from uavdepth.errors import (
     CameraModelError,
     DepthCodecError,
+    HintError,
     ImageSizeError,
     ModelCardError,
     ModelFileError,
@@ -31,6 +32,7 @@ from uavdepth.errors import (
     UavDepthError,
 )
 from uavdepth.ground_scale import GroundScale, GroundScaler, vertical_height_m
+from uavdepth.hints import GroundHint, Hints, PointHints
 from uavdepth.obstacle_message import encode_obstacle_distance, obstacle_words
 from uavdepth.obstacle_scan import ObstacleScan, SectorState
 from uavdepth.scale_tracker import ScaleTracker
@@ -49,14 +51,18 @@ __all__ = [
     "DepthMap",
     "DepthModel",
     "DepthPictureInfo",
+    "GroundHint",
     "GroundScale",
     "GroundScaler",
+    "HintError",
+    "Hints",
     "ImageSizeError",
     "ModelCard",
     "ModelCardError",
     "ModelFileError",
     "ObstacleScan",
     "ObstacleScanner",
+    "PointHints",
     "ScaleTracker",
     "ScanError",
     "SceneError",

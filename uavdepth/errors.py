@@ -23,6 +23,10 @@ class ModelFileError(UavDepthError):
     """A network file that is missing or that ONNX Runtime cannot load."""
 
 
+class HintError(UavDepthError, ValueError):
+    """A ground or point hint with numbers that no scene has."""
+
+
 class DepthCodecError(UavDepthError, ValueError):
     """A depth picture that cannot be encoded or decoded."""
 
