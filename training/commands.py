@@ -60,7 +60,9 @@ def evaluate(
     plan = EvaluationPlan(names, parse_seeds(seeds), frames_per_seed, data)
     report, rows = _evaluate(plan, model, provider, threads, with_sheet=sheet is not None)
     if sheet is not None:
-        _write_sheet(sheet, rows)
+        from training.evaluation_sheet import write_sheet
+
+        write_sheet(sheet, rows, columns=2)
     if as_json:
         typer.echo(json.dumps(report.as_json(), indent=2))
         return
@@ -118,9 +120,8 @@ def _evaluate(
 ) -> tuple[EvaluationReport, list[SheetRow]]:
     from datetime import UTC, datetime
 
-    from training.evaluation import measure_frame
+    from training.evaluation import measure_frame, sheet_row
     from training.evaluation_report import EvaluationReport
-    from training.evaluation_sheet import SheetRow
     from uavdepth.depth_model import DepthModel
 
     network = DepthModel.load(model, provider, threads)
@@ -130,7 +131,7 @@ def _evaluate(
         measured = measure_frame(network, item)
         errors.append(measured.errors)
         if number in shown:
-            rows.append(SheetRow.of(item, measured))
+            rows.append(sheet_row(item, measured))
     report = EvaluationReport(
         model=f"{network.card.name} ({Path(network.source).name}, {network.card.created})",
         provider=network.provider,
@@ -170,18 +171,6 @@ def _with_progress(plan: EvaluationPlan) -> Iterator[EvaluationFrame]:
         disable=not console.is_terminal,
         transient=True,
     )
-
-
-def _write_sheet(path: Path, rows: list[SheetRow]) -> None:
-    import cv2
-
-    from training.evaluation_sheet import draw_sheet
-
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(cv2.imencode(".png", draw_sheet(rows))[1].tobytes())
-    except OSError as error:
-        raise EvaluationError(f"cannot write the picture sheet {path}: {error.strerror}") from error
 
 
 def _measured_errors(path: Path) -> dict[str, Any]:

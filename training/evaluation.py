@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from training.baselines import constant_depth, flat_ground_depth
 from training.data.frame_store import NewFrame
 from training.evaluation_frames import EvaluationFrame
+from training.evaluation_sheet import SheetRow
 from training.metrics import DepthMetrics, depth_metrics, median_factor
 from uavdepth.depth_model import DepthModel
 from uavdepth.ground_scale import GroundScaler
@@ -103,6 +104,21 @@ def measure_frame(model: DepthModel, item: EvaluationFrame) -> MeasuredFrame:
         _within_sigma(frame, predicted, answer.relative_sigma, factor),
     )
     return MeasuredFrame(errors, predicted)
+
+
+def sheet_row(item: EvaluationFrame, measured: MeasuredFrame) -> SheetRow:
+    """Row of a measured frame; the prediction is drawn at the truth's median, as the caption says."""
+    errors = measured.errors
+    factor, network = errors.median_factor, errors.methods.get(Method.NETWORK)
+    caption = f"{item.scene}:{item.seed} #{item.index}"
+    if factor is not None and network is not None:
+        ground = "-" if errors.ground_factor is None else f"{errors.ground_factor:.2f}"
+        caption += (
+            f"  Abs Rel {network.scaled.abs_rel:.3f} scaled, {network.unscaled.abs_rel:.3f} as given; "
+            f"factor {factor:.2f}, from the ground {ground}"
+        )
+    shown = measured.predicted_m * np.float32(1.0 if factor is None else factor)
+    return SheetRow(caption, item.frame.image_bgr, item.frame.depth_m, shown)
 
 
 @dataclass(frozen=True)

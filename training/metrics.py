@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 DEPTH_CAP_M = 80.0
 """Truth from here on, sky included, is not measured; predictions are cut off here."""
 
-SMALLEST_DEPTH_M = 1e-3
+SMALLEST_DEPTH_M = 0.1
+"""Truth nearer than this is not measured, predictions are cut off here: no network says less."""
+
 MIN_PIXELS = 100
 """Fewer pixels with a truth say nothing about a picture."""
 
@@ -54,9 +56,10 @@ class DepthMetrics:
 
 
 def measurable(truth_m: NDArray[np.float32], predicted_m: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """(H, W) pixels that count: truth finite and nearer than the cap, prediction known."""
+    """(H, W) pixels that count: truth known, from the smallest depth to the cap, and prediction known."""
     with np.errstate(invalid="ignore"):
-        return np.asarray((truth_m > 0) & (truth_m < DEPTH_CAP_M) & ~np.isnan(predicted_m), np.bool_)
+        counted = (truth_m >= SMALLEST_DEPTH_M) & (truth_m < DEPTH_CAP_M)
+    return np.asarray(counted & ~np.isnan(predicted_m), np.bool_)
 
 
 def median_factor(truth_m: NDArray[np.float32], predicted_m: NDArray[np.float32]) -> float | None:

@@ -15,10 +15,10 @@ from training.commands import evaluate, indices_for_sheet, parse_seeds
 from training.data.frame_store import read_frames
 from training.data.seed_split import SeedSplit
 from training.errors import EvaluationError
-from training.evaluation import MeasuredFrame, Method, measure_frame, summarise
+from training.evaluation import MeasuredFrame, Method, measure_frame, sheet_row, summarise
 from training.evaluation_frames import EvaluationFrame, EvaluationPlan
 from training.evaluation_report import EvaluationReport
-from training.evaluation_sheet import SheetRow, draw_sheet
+from training.evaluation_sheet import draw_sheet
 from uavdepth.camera import CameraModel
 from uavdepth.depth_map import DepthMap
 from uavdepth.depth_model import DepthModel
@@ -150,7 +150,7 @@ def test_seeds_that_cannot_be_read_are_named(text: str) -> None:
 
 def test_the_sheet_shows_picture_truth_and_prediction() -> None:
     item, result = measured()
-    row = SheetRow.of(item, result)
+    row = sheet_row(item, result)
     assert "city:1000" in row.caption
     assert np.allclose(row.predicted_m, row.truth_m, rtol=1e-4)
     sheet = draw_sheet([row, row, row])
