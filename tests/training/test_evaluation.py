@@ -153,9 +153,9 @@ def test_the_sheet_shows_picture_truth_and_prediction() -> None:
     row = sheet_row(item, result)
     assert "city:1000" in row.caption
     assert np.allclose(row.predicted_m, row.truth_m, rtol=1e-4)
-    sheet = draw_sheet([row, row, row])
+    sheet = draw_sheet([row, row, row], columns=2)
     assert sheet.dtype == np.uint8
-    assert sheet.shape[1] > 6 * 300
+    assert sheet.shape[1] > 8 * 300
 
 
 def test_the_sheet_takes_as_many_frames_of_each_scene() -> None:
