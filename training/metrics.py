@@ -85,27 +85,56 @@ def depth_metrics(
     """Errors of one picture.
 
     Args:
-        truth_m: (H, W) float32 z-depth in metres, +inf in the sky.
+        truth_m: (H, W) float32 z-depth in metres, +inf in the sky, NaN or 0 where not known.
         predicted_m: (H, W) float32 predicted z-depth in metres, NaN where unknown (left out), +inf allowed.
         factor: that the prediction is multiplied by first.
 
     Returns:
         The errors, or None with fewer than `MIN_PIXELS` pixels that count.
     """
-    valid = measurable(truth_m, predicted_m)
-    if np.count_nonzero(valid) < MIN_PIXELS:
-        return None
-    truth = truth_m[valid].astype(np.float64)
-    predicted = np.clip(predicted_m[valid].astype(np.float64) * factor, SMALLEST_DEPTH_M, DEPTH_CAP_M)
-    error = truth - predicted
-    log_error = np.abs(np.log(truth) - np.log(predicted))
-    below = [float(np.mean(log_error < power * math.log(1.25))) for power in (1, 2, 3)]
-    return DepthMetrics(
-        abs_rel=float(np.mean(np.abs(error) / truth)),
-        sq_rel=float(np.mean(error**2 / truth)),
-        rmse=float(np.sqrt(np.mean(error**2))),
-        rmse_log=float(np.sqrt(np.mean(log_error**2))),
-        below_125=below[0],
-        below_125_2=below[1],
-        below_125_3=below[2],
-    )
+    return PixelErrors.of(truth_m, predicted_m, factor).mean()
+
+
+@dataclass(frozen=True)
+class PixelErrors:
+    """Errors of the pixels of one picture that count, each (N,) float64.
+
+    Args:
+        truth_m: z-depth in metres.
+        error_m: truth less prediction, metres, after the prediction was cut off at both ends.
+        log_error: size of the log of prediction over truth.
+    """
+
+    truth_m: NDArray[np.float64]
+    error_m: NDArray[np.float64]
+    log_error: NDArray[np.float64]
+
+    @classmethod
+    def of(
+        cls, truth_m: NDArray[np.float32], predicted_m: NDArray[np.float32], factor: float = 1.0
+    ) -> PixelErrors:
+        """Errors of a picture; arguments as in `depth_metrics`."""
+        valid = measurable(truth_m, predicted_m)
+        truth = truth_m[valid].astype(np.float64)
+        predicted = np.clip(predicted_m[valid].astype(np.float64) * factor, SMALLEST_DEPTH_M, DEPTH_CAP_M)
+        return cls(truth, truth - predicted, np.abs(np.log(truth / predicted)))
+
+    def where(self, chosen: NDArray[np.bool_]) -> PixelErrors:
+        """Only some of the pixels."""
+        return PixelErrors(self.truth_m[chosen], self.error_m[chosen], self.log_error[chosen])
+
+    def mean(self) -> DepthMetrics | None:
+        """The seven errors, or None with fewer than `MIN_PIXELS` pixels."""
+        if self.truth_m.size < MIN_PIXELS:
+            return None
+        squared = np.square(self.error_m)
+        below = [float(np.mean(self.log_error < power * math.log(1.25))) for power in (1, 2, 3)]
+        return DepthMetrics(
+            abs_rel=float(np.mean(np.abs(self.error_m) / self.truth_m)),
+            sq_rel=float(np.mean(squared / self.truth_m)),
+            rmse=float(np.sqrt(np.mean(squared))),
+            rmse_log=float(np.sqrt(np.mean(np.square(self.log_error)))),
+            below_125=below[0],
+            below_125_2=below[1],
+            below_125_3=below[2],
+        )

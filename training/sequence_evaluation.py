@@ -17,6 +17,7 @@ from torch import Tensor, nn
 from training.errors import EvaluationError
 from training.evaluation_sheet import SheetRow, spread_evenly
 from training.metrics import DEPTH_CAP_M, SMALLEST_DEPTH_M, DepthMetrics, depth_metrics, median_factor
+from training.networks.disparity import disparity_to_depth
 from uavdepth.errors import UavDepthError
 
 _STRIDE_OF_NETWORKS = 32
@@ -204,8 +205,7 @@ def _depth_at(
 ) -> NDArray[np.float32]:
     """(H, W) float32 depth of a (1, 1, h, w) disparity at the truth's size."""
     resized = nn.functional.interpolate(disparity.float(), list(shape), mode="bilinear", align_corners=False)
-    nearest, farthest = 1.0 / min_depth_m, 1.0 / max_depth_m
-    depth = (1.0 / (farthest + (nearest - farthest) * resized))[0, 0].cpu().numpy()
+    depth = disparity_to_depth(resized, min_depth_m, max_depth_m)[0, 0].cpu().numpy()
     if not np.isfinite(depth).all():
         raise EvaluationError(f"the network's answer to {where} is not finite: its training broke down")
     return np.asarray(depth, np.float32)
