@@ -27,3 +27,11 @@ class ExportError(UavDepthError):
 
 class EvaluationError(UavDepthError, ValueError):
     """An evaluation that cannot be made or read."""
+
+
+class PhotometricShapeError(UavDepthError, ValueError):
+    """Pictures, disparities, intrinsics or transforms of shapes that do not belong together."""
+
+
+class PhotometricSettingsError(UavDepthError, ValueError):
+    """A weight or a range of depth of the photometric loss that has no meaning."""
