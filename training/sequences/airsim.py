@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from training.errors import TrainingDataError
+from training.sequences.calibration import NO_CALIBRATION, Calibration
 from training.sequences.camera_file import read_camera
 from training.sequences.errors import BrokenFrameError
 from training.sequences.frame_sequence import file_problem
@@ -18,7 +20,6 @@ from training.sequences.pfm import read_pfm
 from training.sequences.pictures import (
     PICTURE_SUFFIXES,
     read_calibrated_picture,
-    require_first_picture,
     require_size,
 )
 from training.sequences.quaternion import rotation_from_quaternion
@@ -31,6 +32,7 @@ IMAGES = "images"
 
 _POSE = ("POS_X", "POS_Y", "POS_Z", "Q_W", "Q_X", "Q_Y", "Q_Z")
 _PICTURES = "ImageFile"
+_VEHICLE = "VehicleName"
 _NAMED_BY_AIRSIM = re.compile(r"(?P<camera>img_.*)_(?P<type>\d+)_\d+$")
 _SCENE, _DEPTH_PLANAR, _DEPTH_PERSPECTIVE = 0, 1, 2
 """AirSim's `ImageType`, the last number but one of a file's name."""
@@ -46,6 +48,7 @@ class RecordedFrame:
         perspective: whether the depth is the distance from the camera's centre, not along its axis.
         pose: x, y, z (NED, metres) and the quaternion w, x, y, z of the vehicle; None: a broken line.
         trouble: why the line cannot be used, or None.
+        vehicle: whose camera it was; None: a broken line.
     """
 
     picture: Path
@@ -53,6 +56,7 @@ class RecordedFrame:
     perspective: bool = False
     pose: tuple[float, ...] | None = None
     trouble: str | None = None
+    vehicle: str | None = None
 
 
 @dataclass(frozen=True)
@@ -106,12 +110,12 @@ class AirSimRecording:
         return matrix
 
 
-def open_airsim(root: Path, camera: CameraModel | None = None) -> list[AirSimRecording]:
-    """The recording in a folder, or all recordings in its sub-folders, sorted by name.
+def open_airsim(root: Path, calibration: Calibration = NO_CALIBRATION) -> list[AirSimRecording]:
+    """The recording in a folder, or all recordings in its sub-folders, sorted; one for each vehicle.
 
     Args:
         root: a folder with `airsim_rec.txt`, or one whose sub-folders have it.
-        camera: intrinsics of recordings without a `camera.json`.
+        calibration: of recordings without a `camera.json`.
 
     Raises:
         TrainingDataError: no recording there, no intrinsics, no header, or pictures of another size.
@@ -123,23 +127,37 @@ def open_airsim(root: Path, camera: CameraModel | None = None) -> list[AirSimRec
     )
     if not folders:
         raise TrainingDataError(f"no {RECORDING} in {root} or in its sub-folders")
-    return [_open_recording(folder, camera) for folder in folders]
+    return [recording for folder in folders for recording in _open_recordings(folder, calibration)]
 
 
-def _open_recording(folder: Path, camera: CameraModel | None) -> AirSimRecording:
+def _open_recordings(folder: Path, calibration: Calibration) -> list[AirSimRecording]:
+    frames = _read_recording(folder)
+    readable = (each.picture for each in frames if each.trouble is None)
+    first = next((path for path in readable if file_problem(path) is None), None)
+    if first is None:
+        what = frames[0].trouble or "none of its pictures is there" if frames else "no frame"
+        raise TrainingDataError(f"{folder / RECORDING} holds nothing usable: {what}")
     described = folder / CAMERA
     if described.is_file():
-        camera = read_camera(described)
-    if camera is None:
-        raise TrainingDataError(f"no intrinsics for {folder}: write {CAMERA} there, or give a calibration")
+        calibration = Calibration(read_camera(described))
+    camera = calibration.of(first)
     if any(camera.distortion):
         raise TrainingDataError(f"{folder}: AirSim's cameras have no distortion, the calibration has one")
-    frames = _read_recording(folder)
+    vehicles = _by_vehicle(frames)
+    return [
+        AirSimRecording(folder.name if len(vehicles) == 1 else f"{folder.name}/{vehicle}", camera, tuple(own))
+        for vehicle, own in sorted(vehicles.items())
+    ]
+
+
+def _by_vehicle(frames: Sequence[RecordedFrame]) -> dict[str, list[RecordedFrame]]:
+    """The lines of each vehicle; a broken line is a gap in the vehicle's recording that it stands in."""
+    vehicles: dict[str, list[RecordedFrame]] = {}
+    vehicle = next((frame.vehicle for frame in frames if frame.vehicle is not None), "")
     for frame in frames:
-        if frame.trouble is None and file_problem(frame.picture) is None:
-            require_first_picture(frame.picture, camera)
-            break
-    return AirSimRecording(folder.name, camera, frames)
+        vehicle = vehicle if frame.vehicle is None else frame.vehicle
+        vehicles.setdefault(vehicle, []).append(frame)
+    return vehicles
 
 
 def _read_recording(folder: Path) -> tuple[RecordedFrame, ...]:
@@ -184,6 +202,7 @@ def _read_line(folder: Path, number: int, line: str, columns: dict[str, int]) ->
         images / depth if depth is not None else None,
         depth is not None and _image_type(depth) == _DEPTH_PERSPECTIVE,
         pose,
+        vehicle=fields[columns[_VEHICLE]].strip() if _VEHICLE in columns else "",
     )
 
 

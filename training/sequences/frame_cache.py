@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from training.errors import TrainingDataError
-from training.sequences.frame_sequence import FrameSequence
+from training.sequences.frame_sequence import FrameSequence, StreamedSequence
 
 _FRAMES, _SUMS = "frames.u8", "sums.u64"
 _FILLED = 1 << 32
@@ -55,6 +55,8 @@ class FrameCache:
                 f"cannot keep {int(np.prod(shape)) / 1e6:.0f} MB of decoded frames in {home}: {error}"
             ) from error
         self._trusted = np.zeros(len(sequence), bool)
+        if isinstance(sequence, StreamedSequence):
+            self._fill_in_order(sequence)
 
     def rgb(self, index: int) -> NDArray[np.uint8]:
         """(height, width, 3) RGB frame; a view of the cache, not to be written to.
@@ -64,12 +66,22 @@ class FrameCache:
         """
         frame = self._frames[index]
         if not self._trusted[index]:
-            if int(self._sums[index]) != _checksum(frame):
-                decoded = resized(self._sequence.image_bgr(index), *self._size)[:, :, ::-1]
-                frame[...] = decoded
-                self._sums[index] = _checksum(frame)
+            if not self._has(index):
+                self._keep(index, self._sequence.image_bgr(index))
             self._trusted[index] = True
         return np.asarray(frame)
+
+    def _has(self, index: int) -> bool:
+        return int(self._sums[index]) == _checksum(self._frames[index])
+
+    def _keep(self, index: int, image_bgr: NDArray[np.uint8]) -> None:
+        self._frames[index] = resized(image_bgr, *self._size)[:, :, ::-1]
+        self._sums[index] = _checksum(self._frames[index])
+
+    def _fill_in_order(self, sequence: StreamedSequence) -> None:
+        if not all(self._has(index) for index in range(len(sequence))):
+            for index, image_bgr in enumerate(sequence.images_bgr()):
+                self._keep(index, image_bgr)
 
 
 def resized(picture: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:

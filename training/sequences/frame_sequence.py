@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +53,15 @@ class PosedSequence(FrameSequence, Protocol):
 
     def world_from_camera(self, index: int) -> NDArray[np.float64]:
         """(4, 4) pose of the camera (x right, y down, z forward), metres, in the recording's own world."""
+        ...
+
+
+@runtime_checkable
+class StreamedSequence(FrameSequence, Protocol):
+    """A sequence that is decoded in order, such as a video: single frames come at the price of all before."""
+
+    def images_bgr(self) -> Iterator[NDArray[np.uint8]]:
+        """All pictures in order. Raises BrokenFrameError: one is unreadable or of another size."""
         ...
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from training.errors import TrainingDataError
 from training.sequences.errors import BrokenFrameError
 
 _HEADER = re.compile(rb"P([fF])\s+(\d+)\s+(\d+)\s+([-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?\d+)?)[ \t\r]*\n")
@@ -51,10 +52,10 @@ def write_pfm(path: Path, values: NDArray[np.float32]) -> None:
     """Write a (H, W) map as a little-endian one-channel PFM file.
 
     Raises:
-        ValueError: not two-dimensional, or empty.
+        TrainingDataError: not two-dimensional, or empty.
     """
     if values.ndim != 2 or values.size == 0:
-        raise ValueError(f"a map of shape {values.shape} is no PFM picture: (height, width) is needed")
+        raise TrainingDataError(f"a map of shape {values.shape} is no PFM picture: (height, width) is needed")
     height, width = values.shape
     rows = np.ascontiguousarray(values[::-1], dtype="<f4")
     path.write_bytes(f"Pf\n{width} {height}\n-1.0\n".encode("ascii") + rows.tobytes())

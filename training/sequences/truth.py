@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from uavdepth.camera import CameraModel
 
 SKY_M = 10_000.0
-"""Simulators write sky as a depth at the end of their number format (half floats: 65,504 m)."""
+"""Simulators give sky a very large depth: TartanAir 10 km, AirSim the largest half float, 65,504 m."""
 
 
 def usable_truth(depth_m: NDArray[np.floating]) -> NDArray[np.float32]:
