@@ -6,7 +6,6 @@ overall scale of a picture is a constant added to e.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
 
 import torch
@@ -14,20 +13,42 @@ from torch import Tensor
 
 from training.data.batches import Batch
 from training.networks.depth_network import DepthOutput
+from training.normalization import FOCAL_REFERENCE_PX
 
-_LAPLACE_SIGMA_LOG = 0.5 * math.log(2.0)
-"""log of sigma / b: a Laplace distribution of scale b has the standard deviation sqrt(2) b."""
+NEAR_TRUTH_M = 20.0
+"""Depth within which obstacles count most: a vehicle at 10 m/s needs that much to stop."""
+
+FAR_UNCERTAINTY = 0.35
+"""Relative error that sky counts with when sigma is taught: "at least 200 m" is no distance, and this is how
+uncertain a network may well be that is sure of the sky."""
+
+_SMALLEST_ERROR = 2e-3
 
 
 @dataclass(frozen=True)
 class LossWeights:
-    """Weight of each term; `far` weighs pixels of sky within the terms that use them."""
+    """Weight of each term and of the pixels within them.
+
+    Args:
+        absolute, shape, edges, sigma: of the terms.
+        uncorrected: of the prediction before the points corrected it.
+        far: of a pixel of sky within the terms that use them.
+        near: of a pixel nearer than `NEAR_TRUTH_M`; others count 1.
+        hinted: of a picture with any hint in the absolute terms; one without counts 1, because its metres
+            can only be guessed.
+        sigma_quantile: share of errors that are to be below sigma: 0.683 as for a normal distribution, and
+            a little, because errors on worlds that were never seen are larger.
+    """
 
     absolute: float = 0.5
     shape: float = 1.0
     edges: float = 0.5
-    sigma: float = 0.05
+    sigma: float = 0.1
+    uncorrected: float = 0.2
     far: float = 0.2
+    near: float = 1.5
+    hinted: float = 2.0
+    sigma_quantile: float = 0.70
 
 
 @dataclass(frozen=True)
@@ -38,6 +59,7 @@ class LossTerms:
     shape: Tensor
     edges: Tensor
     sigma: Tensor
+    uncorrected: Tensor
     total: Tensor
 
     def detached(self) -> LossTerms:
@@ -48,24 +70,41 @@ class LossTerms:
 def depth_loss(output: DepthOutput, batch: Batch, weights: LossWeights) -> LossTerms:
     """Loss of a batch; each term is a mean over the pixels that it uses."""
     near = ~batch.far
-    error = output.log_inverse_depth - batch.log_inverse_depth
-    # Sky is at least as far as the largest depth: only a nearer answer is wrong.
-    error = torch.where(batch.far, error.clamp_min(0.0), error)
+    pixels = pixel_weights(batch, weights)
+    metric = pixels * hinted_weights(batch, weights.hinted)
+    error = _error(output.log_inverse_depth, batch)
     aligned = error - image_median(error.detach(), near)
-    absolute = absolute_term(error, near, weights.far)
-    shape = masked_mean(aligned.abs(), near)
+    absolute = absolute_term(error, metric)
+    uncorrected = absolute_term(_error(output.uncorrected, batch), metric)
+    shape = absolute_term(aligned, torch.where(near, pixels, 0.0))
     edges = edge_term(error, near)
-    sigma = sigma_term(output.log_sigma, aligned.detach(), near)
+    sigma = sigma_term(output.log_sigma, error.detach(), batch.far, weights)
     total = (
-        weights.absolute * absolute + weights.shape * shape + weights.edges * edges + weights.sigma * sigma
+        weights.absolute * absolute
+        + weights.uncorrected * uncorrected
+        + weights.shape * shape
+        + weights.edges * edges
+        + weights.sigma * sigma
     )
-    return LossTerms(absolute, shape, edges, sigma, total)
+    return LossTerms(absolute, shape, edges, sigma, uncorrected, total)
 
 
-def absolute_term(error: Tensor, near: Tensor, far_weight: float) -> Tensor:
-    """Mean |e|, pixels of the sky counted by `far_weight`."""
-    weight = torch.where(near, 1.0, far_weight)
-    return (error.abs() * weight).sum() / weight.sum()
+def pixel_weights(batch: Batch, weights: LossWeights) -> Tensor:
+    """(N, 1, H, W) how much each pixel counts."""
+    depth_m = torch.exp(-batch.log_inverse_depth) * (batch.focal_px / FOCAL_REFERENCE_PX)[:, None, None, None]
+    weight = torch.where(depth_m < NEAR_TRUTH_M, weights.near, 1.0)
+    return torch.where(batch.far, weights.far, weight)
+
+
+def hinted_weights(batch: Batch, hinted: float) -> Tensor:
+    """(N, 1, 1, 1) `hinted` for pictures that came with a hint, 1 for others."""
+    anything = batch.ground.flatten(1).amax(dim=1) + batch.points.flatten(1).amax(dim=1)
+    return torch.where(anything > 0, hinted, 1.0)[:, None, None, None]
+
+
+def absolute_term(error: Tensor, weight: Tensor) -> Tensor:
+    """Weighted mean of |e|, 0 without weight."""
+    return (error.abs() * weight).sum() / weight.sum().clamp_min(1e-6)
 
 
 def image_median(error: Tensor, near: Tensor) -> Tensor:
@@ -92,12 +131,31 @@ def edge_term(error: Tensor, near: Tensor) -> Tensor:
     return torch.stack(terms).mean()
 
 
-def sigma_term(log_sigma: Tensor, aligned: Tensor, near: Tensor) -> Tensor:
-    """Laplace negative log likelihood of the error that is left once the picture's scale is known."""
-    log_b = log_sigma - _LAPLACE_SIGMA_LOG
-    return masked_mean(aligned.abs() * torch.exp(-log_b) + log_b, near)
+def sigma_term(log_sigma: Tensor, error: Tensor, far: Tensor, weights: LossWeights) -> Tensor:
+    """Quantile loss of log |e|: least where `sigma_quantile` of the errors are below sigma.
+
+    A likelihood would assume how errors are distributed, and calibration would depend on it; a quantile is
+    what calibration means, and it is the same of |e| and of its logarithm, in which near and far errors pull
+    alike (Koenker and Bassett 1978, equation 3.1).
+
+    Args:
+        log_sigma: (N, 1, H, W) as the network says it.
+        error: (N, 1, H, W) of the depth as given, without gradient.
+        far: (N, 1, H, W) bool sky, whose errors count as `FAR_UNCERTAINTY` at least.
+        weights: of a run.
+    """
+    size = torch.where(far, error.abs().clamp_min(FAR_UNCERTAINTY), error.abs().clamp_min(_SMALLEST_ERROR))
+    excess = torch.log(size) - log_sigma
+    loss = torch.maximum(weights.sigma_quantile * excess, (weights.sigma_quantile - 1.0) * excess)
+    return absolute_term(loss, torch.where(far, weights.far, 1.0))
 
 
 def masked_mean(values: Tensor, mask: Tensor) -> Tensor:
     """Mean over the pixels of a mask, 0 if it is empty."""
     return torch.where(mask, values, 0.0).sum() / mask.sum().clamp_min(1)
+
+
+def _error(log_inverse_depth: Tensor, batch: Batch) -> Tensor:
+    """Difference to the truth; sky is at least as far as the largest depth, so only nearer is wrong."""
+    error = log_inverse_depth - batch.log_inverse_depth
+    return torch.where(batch.far, error.clamp_min(0.0), error)

@@ -19,7 +19,7 @@ class RunSummary:
         step, images, trained_s, progress: at the last of them.
         images_per_s: pictures trained on per second of training.
         rate_factor: learning rate as a share of the highest.
-        absolute, shape, edges, sigma, total: loss terms, unweighted, and their weighted sum.
+        absolute, shape, edges, sigma, uncorrected, total: loss terms, unweighted, and their weighted sum.
         frames: size of the training set.
     """
 
@@ -33,6 +33,7 @@ class RunSummary:
     shape: float
     edges: float
     sigma: float
+    uncorrected: float
     total: float
     frames: int
 
@@ -47,7 +48,7 @@ class RunSummary:
             f"{100 * self.progress:5.1f} %  {self.left_s / 60:.1f} min left  "
             f"step {self.step}  {self.images} pictures  "
             f"{self.images_per_s:.1f}/s  loss {self.total:.3f}  absolute {self.absolute:.3f}  "
-            f"shape {self.shape:.3f}  edges {self.edges:.3f}  frames {self.frames}"
+            f"shape {self.shape:.3f}  edges {self.edges:.3f}  sigma {self.sigma:.3f}  frames {self.frames}"
         )
 
 
@@ -80,7 +81,7 @@ class RunLog:
         images, trained_s = self._since
         if report.trained_s - trained_s < self._every_s and report.progress < 1.0:
             return None
-        names = ("absolute", "shape", "edges", "sigma", "total")
+        names = ("absolute", "shape", "edges", "sigma", "uncorrected", "total")
         means = {
             name: sum(getattr(item.terms, name).item() for item in self._reports) / len(self._reports)
             for name in names

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from training.data.hint_sampling import HintShares
 from training.errors import TrainingSettingsError
 from training.losses import LossWeights
 from training.networks.depth_network import NetworkShape
@@ -35,7 +36,27 @@ class SizePhase:
 
 
 DEFAULT_PHASES = (SizePhase(0.5, 320, 160, 8), SizePhase(1.0, 384, 192, 8))
-"""Half the run on smaller pictures, a third faster; the rest at the size that is exported."""
+"""Half the run on smaller pictures, a third faster; the rest at the smaller of the exported sizes."""
+
+
+@dataclass(frozen=True)
+class LargePictures:
+    """Batches of another size in the last phase: one network is to serve both exported sizes.
+
+    Args:
+        every: of so many batches one is large.
+        width, height, batch: as in `SizePhase`.
+    """
+
+    every: int = 3
+    width: int = 640
+    height: int = 320
+    batch: int = 3
+
+    def __post_init__(self) -> None:
+        SizePhase(1.0, self.width, self.height, self.batch)
+        if self.every < 1:
+            raise TrainingSettingsError(f"one of {self.every} batches is large: at least 1 is needed")
 
 
 @dataclass(frozen=True)
@@ -45,7 +66,8 @@ class TrainingSettings:
     Args:
         images: length of the run in pictures, or None.
         minutes: length of the run in minutes of training, or None; exactly one of the two is given.
-        phases: picture sizes; the last one is the exported size.
+        phases: picture sizes.
+        large: larger pictures among those of the last phase, or None.
         decoder_rate, encoder_rate: highest learning rates of Adam.
         warm_up: share of the run in which the rates rise.
         final_rate: rates at the end, as a share of the highest.
@@ -54,6 +76,7 @@ class TrainingSettings:
         average_decay: of the exponential moving average of the weights, per step.
         seed: of the order of pictures and of random weights.
         precision: "auto", "fp32" or "bf16".
+        hints: how often each subset of hints comes.
         loss: weights of the terms.
         shape: of the network.
     """
@@ -61,6 +84,7 @@ class TrainingSettings:
     images: int | None = None
     minutes: float | None = None
     phases: tuple[SizePhase, ...] = DEFAULT_PHASES
+    large: LargePictures | None = field(default_factory=LargePictures)
     decoder_rate: float = 2e-3
     encoder_rate: float = 4e-4
     warm_up: float = 0.05
@@ -70,6 +94,7 @@ class TrainingSettings:
     average_decay: float = 0.997
     seed: int = 0
     precision: str = "auto"
+    hints: HintShares = field(default_factory=HintShares)
     loss: LossWeights = field(default_factory=LossWeights)
     shape: NetworkShape = field(default_factory=NetworkShape)
 
@@ -92,8 +117,15 @@ class TrainingSettings:
         return min(trained_s / (60.0 * (self.minutes or 1.0)), 1.0)
 
     def phase_at(self, progress: float) -> SizePhase:
-        """The picture size in use."""
+        """The phase in use."""
         return next((phase for phase in self.phases if progress < phase.until), self.phases[-1])
+
+    def size_of(self, number: int, progress: float) -> SizePhase:
+        """Size of the batch of that number."""
+        phase = self.phase_at(progress)
+        if self.large is None or phase is not self.phases[-1] or number % self.large.every:
+            return phase
+        return SizePhase(phase.until, self.large.width, self.large.height, self.large.batch)
 
     def rate_factor(self, progress: float) -> float:
         """Share of the highest learning rates: a linear rise, then half a cosine down (one cycle)."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from training.errors import TrainingSettingsError
+from training.errors import CheckpointError, TrainingSettingsError
 from training.extras import needs_extra
 
 if TYPE_CHECKING:
@@ -37,6 +37,10 @@ def train(
         typer.Option(help=f"Length of the run in minutes of training; {DEFAULT_MINUTES:g} if neither."),
     ] = None,
     images: Annotated[int | None, typer.Option(help="Length of the run in pictures shown.")] = None,
+    init: Annotated[
+        Path | None,
+        typer.Option(help="Checkpoint of another run to start from, wherever its weights fit."),
+    ] = None,
     resume: Annotated[bool, typer.Option(help="Go on from the checkpoint in the run's folder.")] = False,
     seed: Annotated[int, typer.Option(help="Seed of random weights and of the order of pictures.")] = 0,
     precision: Annotated[str, typer.Option(help="auto, fp32 or bf16.")] = "auto",
@@ -47,6 +51,8 @@ def train(
     A run in minutes plans its learning rates by the clock, one in pictures is repeatable. Frames may be
     added to the folder while the run goes on. Worlds kept for validation and tests are refused.
     """
+    if init is not None and resume:
+        raise TrainingSettingsError(f"--init {init} and --resume: a run goes on or starts, not both")
     settings = _settings_maker(minutes, images, seed, precision)
     if render:
         _render(data, scenes, seeds, frames_per_seed)
@@ -58,6 +64,8 @@ def train(
     if threads is not None:
         torch.set_num_threads(threads)
     trainer = _trainer(data, output / CHECKPOINT_NAME, resume, settings)
+    if init is not None:
+        typer.echo(f"{init}: {trainer.start_from(init)} numbers taken over")
     _run(trainer, output)
 
 
@@ -113,6 +121,14 @@ def _trainer(data: Path, checkpoint: Path, resume: bool, settings: SettingsMaker
     return Trainer(settings(None), FramePool(data))
 
 
+def _try_to_save(trainer: Trainer, path: Path) -> None:
+    """Save on the way; a disk that is full now may have room later, so the run goes on."""
+    try:
+        trainer.save(path)
+    except CheckpointError as error:
+        typer.echo(str(error), err=True)
+
+
 def _run(trainer: Trainer, output: Path) -> None:
     from training.run_log import RunLog
 
@@ -126,8 +142,8 @@ def _run(trainer: Trainer, output: Path) -> None:
             if summary is not None:
                 typer.echo(summary.line())
             if report.trained_s - saved_s > _SAVE_EVERY_S:
-                trainer.save(output / CHECKPOINT_NAME)
                 saved_s = report.trained_s
+                _try_to_save(trainer, output / CHECKPOINT_NAME)
     finally:
         trainer.save(output / CHECKPOINT_NAME)
     typer.echo(

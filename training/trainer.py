@@ -11,9 +11,9 @@ import torch
 from torch import nn
 
 from training.averaging import AverageWeights
-from training.checkpoint import Checkpoint
+from training.checkpoint import Checkpoint, read_weights
 from training.data.batches import Batch, BatchRequest, BatchSource, FramePool
-from training.errors import TrainingDataError
+from training.errors import CheckpointError, TrainingDataError
 from training.losses import LossTerms, depth_loss
 from training.networks.depth_network import DepthNetwork
 from training.precision import autocast, resolve_precision
@@ -57,7 +57,7 @@ class Trainer:
         self.images = 0
         self.trained_s = 0.0
         self._pool = pool
-        self._source = BatchSource(pool, settings.seed, _BATCHES_AHEAD)
+        self._source = BatchSource(pool, settings.seed, _BATCHES_AHEAD, settings.hints)
         self._seconds = seconds
         self._precision = resolve_precision(settings.precision)
         torch.manual_seed(settings.seed)
@@ -78,12 +78,34 @@ class Trainer:
     ) -> Trainer:
         """Go on from a checkpoint, with its settings unless others are given (another length, say)."""
         trainer = cls(settings or checkpoint.settings, pool, pretrained=False, seconds=seconds)
-        trainer.network.load_state_dict(checkpoint.network)
+        checkpoint.restore(trainer.network)
         trainer._average.state = {k: v.clone() for k, v in checkpoint.average.items()}
         trainer._optimizer.load_state_dict(checkpoint.optimizer)
         trainer.step, trainer.images = checkpoint.step, checkpoint.images
         trainer.trained_s = checkpoint.trained_s
         return trainer
+
+    def start_from(self, path: Path) -> int:
+        """Take over the weights of another run's checkpoint wherever name and shape fit.
+
+        Returns:
+            How many of the network's weights were found there.
+
+        Raises:
+            CheckpointError: a file that is no checkpoint, or none of whose weights fits.
+        """
+        weights = read_weights(path)
+        state = self.network.state_dict()
+        fitting = {
+            name: value
+            for name, value in weights.items()
+            if name in state and state[name].shape == value.shape
+        }
+        if not fitting:
+            raise CheckpointError(f"{path}: none of its {len(weights)} weights fits the network")
+        self.network.load_state_dict(fitting, strict=False)
+        self._average = AverageWeights(self.network, self.settings.average_decay)
+        return sum(value.numel() for value in fitting.values())
 
     @property
     def progress(self) -> float:
@@ -137,15 +159,15 @@ class Trainer:
         """Batches to make, numbered by step; made ahead, so pictures are counted as requested here."""
         number, images = self.step, self.images
         while (progress := self.settings.progress(images, self.trained_s)) < 1.0:
-            phase = self.settings.phase_at(progress)
-            yield BatchRequest(number, phase.batch, phase.width, phase.height)
-            number, images = number + 1, images + phase.batch
+            size = self.settings.size_of(number, progress)
+            yield BatchRequest(number, size.batch, size.width, size.height)
+            number, images = number + 1, images + size.batch
 
     def _learn(self, batch: Batch, factor: float) -> LossTerms:
         for group in self._optimizer.param_groups:
             group["lr"] = group["highest_rate"] * factor
         with autocast(self._precision):
-            output = self.network(batch.image)
+            output = self.network(batch.image, batch.ground, batch.points)
         terms = depth_loss(output, batch, self.settings.loss)
         if not torch.isfinite(terms.total):
             raise TrainingDataError(

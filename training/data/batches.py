@@ -13,13 +13,19 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from training.data.augmentation import change_light, cut_depth, cut_image, sample_crop
-from training.data.frame_store import FrameRecord, read_frames
+from training.data.frame_store import FrameRecord, FrameStore
+from training.data.hint_sampling import HintShares, hint_maps, sample_hints
 from training.data.seed_split import SeedSplit
+from training.data.views import View, view_of_crop
 from training.errors import TrainingDataError
 from training.normalization import IMAGE_MEAN, IMAGE_STD, MAX_DEPTH_M, log_inverse_depth
 
-SCENE_SHARES: Mapping[str, float] = {"city": 0.46, "mountain": 0.18, "forest": 0.18, "wall": 0.18}
-"""How often each scene is drawn: streets hold the finest obstacles and the most kinds of them."""
+SCENE_SHARES: Mapping[str, float] = {"city": 2.5}
+"""How often scenes are drawn against each other, 1 if not named: streets hold the finest obstacles and the
+most kinds of them."""
+
+_ENOUGH_FRAMES = 300
+"""A scene with fewer is drawn less, in proportion: it would be learnt by heart."""
 
 
 @dataclass(frozen=True)
@@ -30,18 +36,24 @@ class Batch:
         image: (N, 3, H, W) normalised RGB.
         log_inverse_depth: (N, 1, H, W), as the network says it.
         far: (N, 1, H, W) bool: sky or beyond the largest depth, where the truth is only a lower limit.
+        ground: (N, 1, H, W) the ground's hint, 0 where there is none.
+        points: (N, 2, H, W) the points' hint, 0 where there is none.
+        focal_px: (N,) focal length of each picture in its own pixels.
     """
 
     image: Tensor
     log_inverse_depth: Tensor
     far: Tensor
+    ground: Tensor
+    points: Tensor
+    focal_px: Tensor
 
 
 class FramePool:
     """The frames of a store that are for learning, by scene. It grows while a renderer fills the store."""
 
     def __init__(self, root: Path, shares: Mapping[str, float] = SCENE_SHARES) -> None:
-        self._root = root
+        self._store = FrameStore(root)
         self._shares = shares
         self._by_scene: dict[str, list[FrameRecord]] = {}
         self.rescan()
@@ -57,38 +69,68 @@ class FramePool:
     def rescan(self) -> None:
         """Look again. Raises TrainingDataError: no store, none complete, or a seed kept for tests."""
         by_scene: dict[str, list[FrameRecord]] = {}
-        for record in read_frames(self._root):
+        for record in self._store.frames():
             SeedSplit.TRAIN.require(record.seed)
             by_scene.setdefault(record.scene, []).append(record)
         if not by_scene:
-            raise TrainingDataError(f"no training frames in {self._root}")
+            raise TrainingDataError(f"no training frames in {self._store.root}")
         self._by_scene = by_scene
 
     def draw(self, rng: np.random.Generator, count: int) -> list[FrameRecord]:
         """`count` random frames, scenes by their shares."""
         by_scene = self._by_scene
         names = sorted(by_scene)
-        shares = np.array([self._shares.get(name, 0.1) for name in names])
+        shares = np.array(
+            [self._shares.get(name, 1.0) * min(1.0, len(by_scene[name]) / _ENOUGH_FRAMES) for name in names]
+        )
         chosen = rng.choice(len(names), size=count, p=shares / shares.sum())
         scenes = [by_scene[names[index]] for index in chosen]
         return [records[int(rng.integers(len(records)))] for records in scenes]
 
 
-def make_batch(records: Sequence[FrameRecord], rng: np.random.Generator, width: int, height: int) -> Batch:
-    """Augmented batch of the given frames at the network's size."""
-    images, targets, far = [], [], []
-    for record in records:
-        crop = sample_crop(rng, record.camera.width, record.camera.height)
-        picture = change_light(rng, cut_image(record.image_bgr(), crop, width, height))
-        depth_m = cut_depth(record.depth_m(), crop, width, height)
-        images.append(network_image(picture))
-        targets.append(log_inverse_depth(depth_m, record.camera.fx * width / crop.width))
-        far.append(depth_m >= MAX_DEPTH_M)
+def make_batch(
+    records: Sequence[FrameRecord],
+    rng: np.random.Generator,
+    width: int,
+    height: int,
+    shares: HintShares | None = None,
+) -> Batch:
+    """Augmented batch of the given frames at the network's size.
+
+    Args:
+        records: the frames.
+        rng: random numbers.
+        width, height: the network's size.
+        shares: how often each subset of hints comes; None takes the usual ones.
+    """
+    shares = shares or HintShares()
+    items = [_make_item(record, rng, width, height, shares) for record in records]
+    images, depths, grounds, points, focals = (list(column) for column in zip(*items, strict=True))
+    targets = [log_inverse_depth(depth, focal) for depth, focal in zip(depths, focals, strict=True)]
     return Batch(
         torch.from_numpy(np.stack(images)).to(memory_format=torch.channels_last),
         torch.from_numpy(np.stack(targets)[:, None]),
-        torch.from_numpy(np.stack(far)[:, None]),
+        torch.from_numpy(np.stack(depths)[:, None] >= MAX_DEPTH_M),
+        torch.from_numpy(np.stack(grounds)),
+        torch.from_numpy(np.stack(points)),
+        torch.tensor(focals, dtype=torch.float32),
     )
+
+
+_Array = NDArray[np.float32]
+
+
+def _make_item(
+    record: FrameRecord, rng: np.random.Generator, width: int, height: int, shares: HintShares
+) -> tuple[_Array, _Array, _Array, _Array, float]:
+    """Picture, depth, ground, points and focal length of one frame, augmented."""
+    crop = sample_crop(rng, record.camera.width, record.camera.height)
+    depth_m = cut_depth(record.depth_m(), crop, width, height)
+    picture = change_light(rng, cut_image(record.image_bgr(), crop, width, height))
+    view = view_of_crop(View(record.camera, record.mount, record.attitude), crop, width, height)
+    hints = sample_hints(rng, view, record.height_m, picture, depth_m, shares)
+    ground, points = hint_maps(hints, view, width, height)
+    return network_image(picture), depth_m, ground, points, view.camera.fx
 
 
 def network_image(image_bgr: NDArray[np.uint8]) -> NDArray[np.float32]:
@@ -111,15 +153,17 @@ class BatchRequest:
 class BatchSource:
     """Makes batches ahead of the training step on a thread of its own (OpenCV and NumPy release the lock)."""
 
-    def __init__(self, pool: FramePool, seed: int, ahead: int = 2) -> None:
+    def __init__(self, pool: FramePool, seed: int, ahead: int = 2, shares: HintShares | None = None) -> None:
         self._pool = pool
+        self._shares = shares
         self._seed = seed
         self._ahead = ahead
 
     def make(self, request: BatchRequest) -> Batch:
         """The batch of that number; the same number over the same pool gives the same batch."""
         rng = np.random.default_rng([self._seed, request.number])
-        return make_batch(self._pool.draw(rng, request.count), rng, request.width, request.height)
+        records = self._pool.draw(rng, request.count)
+        return make_batch(records, rng, request.width, request.height, self._shares)
 
     def stream(self, requests: Iterator[BatchRequest]) -> Iterator[Batch]:
         """Batches in the order of `requests`, the next few already being made."""

@@ -112,9 +112,26 @@ def read_frames(root: Path) -> list[FrameRecord]:
     Raises:
         TrainingDataError: no such folder, or a list that cannot be read.
     """
-    if not root.is_dir():
-        raise TrainingDataError(f"no folder of training frames at {root}")
-    return [record for path in sorted(root.glob(f"*/{_LIST}")) for record in _read_list(path)]
+    return FrameStore(root).frames()
+
+
+class FrameStore:
+    """The frames below a folder, read again and again while a renderer adds to them.
+
+    A list is complete once it is there, so each is read only once.
+    """
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self._lists: dict[Path, list[FrameRecord]] = {}
+
+    def frames(self) -> list[FrameRecord]:
+        """As `read_frames`."""
+        if not self.root.is_dir():
+            raise TrainingDataError(f"no folder of training frames at {self.root}")
+        paths = sorted(self.root.glob(f"*/{_LIST}"))
+        self._lists = {path: self._lists.get(path) or list(_read_list(path)) for path in paths}
+        return [record for records in self._lists.values() for record in records]
 
 
 def _read_list(path: Path) -> Iterator[FrameRecord]:

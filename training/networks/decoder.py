@@ -53,7 +53,7 @@ class Decoder(nn.Module):
 
 
 class Head(nn.Module):
-    """One number per pixel from the decoder's features, at the picture's resolution."""
+    """One number per pixel from the decoder's features, at their resolution."""
 
     def __init__(self, inputs: int, hidden: int, initial: float) -> None:
         super().__init__()
@@ -63,4 +63,5 @@ class Head(nn.Module):
         nn.init.constant_(self.output.bias, initial)  # type: ignore[arg-type]
 
     def forward(self, features: Tensor) -> Tensor:
-        return upsample(self.output(replicate_border(self.hidden(features), 1)))
+        output: Tensor = self.output(replicate_border(self.hidden(features), 1))
+        return output
