@@ -1,47 +1,43 @@
-"""Measures a network, as it flies, on rendered frames with exact depth."""
+"""Measures a network, as it flies, on frames with a truth: each source of depth on each frame."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from training.baselines import constant_depth, flat_ground_depth
-from training.data.frame_store import NewFrame
+from training.evaluation_bands import BandedErrors, banded_errors
+from training.evaluation_doubt import DoubtErrors, doubt_errors
 from training.evaluation_frames import EvaluationFrame
+from training.evaluation_knowledge import Knowledge, vehicle_knowledge
+from training.evaluation_obstacles import SCAN_RANGE_M, ElementErrors, compare_scans
 from training.evaluation_sheet import SheetRow
-from training.metrics import DepthMetrics, depth_metrics, median_factor
-from uavdepth.depth_model import DepthModel
-from uavdepth.ground_scale import GroundScaler
-
-PLAUSIBLE_FACTORS = (0.4, 2.5)
-"""Corrections by the ground that are believed of a metric network, as in flight."""
-
-
-class Method(StrEnum):
-    """Where depth comes from."""
-
-    NETWORK = "network"
-    GROUND_SCALED = "network, scaled by the ground"
-    NETWORK_THERE = "network, on those frames"
-    CONSTANT = "constant depth"
-    FLAT_GROUND = "flat ground"
+from training.evaluation_sources import Answer, Sources
+from training.metrics import measurable, median_factor
+from uavdepth.scanner import ObstacleScanner
 
 
 @dataclass(frozen=True)
-class MethodErrors:
-    """Errors of one method on one picture.
+class SourceErrors:
+    """Errors of one source on one picture.
 
     Args:
         scaled: after the picture's median was made right, with the truth's help.
-        unscaled: in metres as given.
+        metric: in metres as given; None for a source whose metres mean nothing.
+        factor: truth over prediction, of the medians.
+        unknown_share: pixels with a truth for which the source says nothing.
+        doubt: sigma against errors; None for a source without sigma.
+        elements: nearest obstacles; None where they were not looked for.
     """
 
-    scaled: DepthMetrics
-    unscaled: DepthMetrics
+    scaled: BandedErrors
+    metric: BandedErrors | None
+    factor: float
+    unknown_share: float
+    doubt: DoubtErrors | None
+    elements: ElementErrors | None
 
 
 @dataclass(frozen=True)
@@ -49,122 +45,97 @@ class FrameErrors:
     """What was measured on one frame.
 
     Args:
-        scene, seed, index: which frame.
-        methods: errors of each method that had an answer.
-        median_factor: truth over network, of the medians; None for a picture without enough truth.
-        ground_factor: the factor found from the ground, or None.
-        within_sigma: share of pixels whose error, at the right scale, is below one sigma; None if unknown.
+        group: kind of scene, or name of a sequence.
+        name: which frame, for people.
+        points: how many points there really were, by the number that was asked for.
+        sources: errors of each source that had an answer; none for a frame without enough truth.
     """
 
-    scene: str
-    seed: int
-    index: int
-    methods: Mapping[Method, MethodErrors]
-    median_factor: float | None
-    ground_factor: float | None
-    within_sigma: float | None
+    group: str
+    name: str
+    points: Mapping[int, int]
+    sources: Mapping[str, SourceErrors]
 
 
 @dataclass(frozen=True)
 class MeasuredFrame:
-    """Errors of a frame and the network's depth, for the picture sheet."""
+    """Errors of a frame, and its row of the picture sheet."""
 
     errors: FrameErrors
-    predicted_m: NDArray[np.float32]
+    row: SheetRow
 
 
-def measure_frame(model: DepthModel, item: EvaluationFrame) -> MeasuredFrame:
-    """Run the network on one frame and compare it, and the two baselines, with the truth."""
+def measure_frame(sources: Sources, item: EvaluationFrame) -> MeasuredFrame:
+    """Run every source on a rendered frame and compare it with the truth, nearest obstacles included."""
     frame = item.frame
-    answer = model.infer(frame.image_bgr, frame.camera)
-    truth, predicted = frame.depth_m, answer.depth_m
-    factor = median_factor(truth, predicted)
-    plausible = PLAUSIBLE_FACTORS if model.card.metric else None
-    scaler = GroundScaler(frame.camera, frame.mount, plausible)
-    ground = scaler.estimate(predicted, frame.attitude, frame.height_m)
-    answers = {Method.NETWORK: predicted, Method.CONSTANT: constant_depth(frame.camera)}
-    if ground is not None:
-        answers[Method.GROUND_SCALED] = predicted * np.float32(ground.factor)
-    if frame.height_m is not None:
-        answers[Method.FLAT_GROUND] = flat_ground_depth(
-            frame.camera, frame.mount, frame.attitude, frame.height_m
-        )
-    found = {method: _errors(truth, depth) for method, depth in answers.items()}
-    methods = {method: errors for method, errors in found.items() if errors is not None}
-    if Method.GROUND_SCALED in methods:
-        # What the ground adds shows only against the same frames without it.
-        methods[Method.NETWORK_THERE] = methods[Method.NETWORK]
+    knowledge = vehicle_knowledge(item, sources.point_counts)
+    answers = sources.answers(frame.image_bgr, knowledge)
+    scored = knowledge.without_points(frame.depth_m)
+    scanner = ObstacleScanner(frame.camera, frame.mount, max_distance_m=SCAN_RANGE_M)
+    truth = scanner.scan(frame.depth_m, frame.attitude, frame.height_m)
+    found: dict[str, SourceErrors] = {}
+    for label, answer in answers.items():
+        elements = None
+        if answer.metric:
+            reported = scanner.scan(answer.depth_m, knowledge.attitude, knowledge.height_m)
+            elements = compare_scans(truth, reported)
+        errors = compare(scored, answer, elements)
+        if errors is not None:
+            found[label] = errors
     errors = FrameErrors(
-        item.scene,
-        item.seed,
-        item.index,
-        methods,
-        factor,
-        None if ground is None else ground.factor,
-        _within_sigma(frame, predicted, answer.relative_sigma, factor),
+        item.scene, f"{item.scene}:{item.seed} #{item.index}", point_counts(knowledge), found
     )
-    return MeasuredFrame(errors, predicted)
+    shown = sources.richest.label
+    return MeasuredFrame(errors, sheet_row(errors, frame.image_bgr, frame.depth_m, shown, answers[shown]))
 
 
-def sheet_row(item: EvaluationFrame, measured: MeasuredFrame) -> SheetRow:
-    """Row of a measured frame; the prediction is drawn at the truth's median, as the caption says."""
-    errors = measured.errors
-    factor, network = errors.median_factor, errors.methods.get(Method.NETWORK)
-    caption = f"{item.scene}:{item.seed} #{item.index}"
-    if factor is not None and network is not None:
-        ground = "-" if errors.ground_factor is None else f"{errors.ground_factor:.2f}"
-        caption += (
-            f"  Abs Rel {network.scaled.abs_rel:.3f} scaled, {network.unscaled.abs_rel:.3f} as given; "
-            f"factor {factor:.2f}, from the ground {ground}"
-        )
-    shown = measured.predicted_m * np.float32(1.0 if factor is None else factor)
-    return SheetRow(caption, item.frame.image_bgr, item.frame.depth_m, shown)
-
-
-@dataclass(frozen=True)
-class MethodSummary:
-    """Mean errors of one method.
+def compare(
+    truth_m: NDArray[np.float32], answer: Answer, elements: ElementErrors | None = None
+) -> SourceErrors | None:
+    """Errors of one answer; None for a picture with too little truth or an answer without a median.
 
     Args:
-        method: which.
-        frames: pictures on which it had an answer.
-        scaled, unscaled: as in `MethodErrors`; None for no pictures.
+        truth_m: (H, W) float32 z-depth in metres, NaN where not scored, +inf in the sky.
+        answer: of a source.
+        elements: its nearest obstacles, where they were looked for.
     """
-
-    method: Method
-    frames: int
-    scaled: DepthMetrics | None
-    unscaled: DepthMetrics | None
-
-
-def summarise(errors: Sequence[FrameErrors]) -> list[MethodSummary]:
-    """Mean errors of each method, each picture counting alike."""
-    summaries = []
-    for method in Method:
-        found = [item.methods[method] for item in errors if method in item.methods]
-        scaled = DepthMetrics.mean([item.scaled for item in found])
-        unscaled = DepthMetrics.mean([item.unscaled for item in found])
-        summaries.append(MethodSummary(method, len(found), scaled, unscaled))
-    return summaries
-
-
-def _errors(truth: NDArray[np.float32], depth: NDArray[np.float32]) -> MethodErrors | None:
-    factor = median_factor(truth, depth)
+    factor = median_factor(truth_m, answer.depth_m)
     if factor is None:
         return None
-    scaled, unscaled = depth_metrics(truth, depth, factor), depth_metrics(truth, depth)
-    return None if scaled is None or unscaled is None else MethodErrors(scaled, unscaled)
-
-
-def _within_sigma(
-    frame: NewFrame,
-    predicted: NDArray[np.float32],
-    sigma: NDArray[np.float32] | None,
-    factor: float | None,
-) -> float | None:
-    """68 % of pixels for an honest Gaussian sigma; 76 % for the Laplace scale that the loss teaches."""
-    if sigma is None or factor is None:
+    scaled = banded_errors(truth_m, answer.depth_m, factor)
+    metric = banded_errors(truth_m, answer.depth_m) if answer.metric else None
+    if scaled is None:
         return None
-    valid = np.isfinite(frame.depth_m) & np.isfinite(predicted) & np.isfinite(sigma)
-    error = np.abs(np.log(frame.depth_m[valid] / (predicted[valid] * np.float32(factor))))
-    return float(np.mean(error < sigma[valid]))
+    doubt = None
+    if answer.relative_sigma is not None:
+        depth = answer.depth_m if answer.metric else answer.depth_m * np.float32(factor)
+        doubt = doubt_errors(truth_m, depth, answer.relative_sigma)
+    there = measurable(truth_m, np.zeros_like(truth_m))
+    unknown = float(np.mean(np.isnan(answer.depth_m[there])))
+    return SourceErrors(scaled, metric, factor, unknown, doubt, elements)
+
+
+def point_counts(knowledge: Knowledge) -> dict[int, int]:
+    """How many points there are, by the number that was asked for."""
+    return {count: len(points) for count, points in knowledge.points.items()}
+
+
+def sheet_row(
+    errors: FrameErrors,
+    image_bgr: NDArray[np.uint8],
+    truth_m: NDArray[np.float32],
+    label: str,
+    answer: Answer,
+) -> SheetRow:
+    """Row of a measured frame: the answer of one source as given, or at the truth's median without metres."""
+    caption, depth_m = errors.name, answer.depth_m
+    found = errors.sources.get(label)
+    if found is not None and found.metric is not None:
+        caption += (
+            f"   {label}: Abs Rel {found.metric.overall.abs_rel:.3f} as given (drawn), "
+            f"{found.scaled.overall.abs_rel:.3f} median-scaled"
+        )
+    elif found is not None:
+        caption += f"   {label}: Abs Rel {found.scaled.overall.abs_rel:.3f} median-scaled (drawn)"
+        depth_m = depth_m * np.float32(found.factor)
+    return SheetRow(caption, image_bgr, truth_m, depth_m, answer.relative_sigma)

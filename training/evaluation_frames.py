@@ -10,7 +10,10 @@ from training.data.frame_store import FrameRecord, NewFrame, read_frames, write_
 from training.data.rendering import render_world
 from training.data.seed_split import SeedSplit
 from training.errors import EvaluationError
+from uavdepth import scenes as worlds
 from uavdepth.scenes import SCENE_NAMES, load_scene
+
+HELD_OUT_SCENES: tuple[str, ...] = getattr(worlds, "HELD_OUT_SCENES", ())
 
 
 @dataclass(frozen=True)
@@ -72,12 +75,23 @@ class EvaluationPlan:
         """How many frames there are."""
         return len(self.scenes) * len(self.seeds) * self.frames_per_seed
 
+    @property
+    def seen_scenes(self) -> tuple[str, ...]:
+        """Those of the scenes whose kind is trained on, with other seeds."""
+        return tuple(scene for scene in self.scenes if scene not in HELD_OUT_SCENES)
+
+    @property
+    def held_out_scenes(self) -> tuple[str, ...]:
+        """Those of the scenes whose kind is never trained on."""
+        return tuple(scene for scene in self.scenes if scene in HELD_OUT_SCENES)
+
     def frames(self) -> Iterator[EvaluationFrame]:
         """The frames, world by world; what the store lacks is rendered.
 
         Raises:
             SceneError: a world that cannot be built.
             TrainingDataError: a store that cannot be read.
+            EvaluationError: a stored frame whose parts do not fit each other.
         """
         stored = self._stored()
         for seed in self.seeds:
@@ -103,10 +117,33 @@ class EvaluationPlan:
         return frames
 
 
+def parse_seeds(text: str) -> tuple[int, ...]:
+    """Seeds of a text such as "1000-1005,1010". Raises EvaluationError."""
+    seeds: list[int] = []
+    for part in text.split(","):
+        first, dash, last = part.strip().partition("-")
+        numbers = [first, last] if dash else [first]
+        if not all(number.isascii() and number.isdigit() for number in numbers):
+            raise EvaluationError(
+                f"seeds are {text!r}: whole numbers and ranges are needed, as 1000-1005,1010"
+            )
+        low, high = int(first), int(numbers[-1])
+        if not low <= high <= low + 10_000:
+            raise EvaluationError(f"seeds {part.strip()!r} are not a rising range of at most 10000")
+        seeds.extend(range(low, high + 1))
+    return tuple(dict.fromkeys(seeds))
+
+
 def _load(record: FrameRecord) -> NewFrame:
-    return NewFrame(
-        record.image_bgr(), record.depth_m(), record.camera, record.mount, record.attitude, record.height_m
-    )
+    image, depth = record.image_bgr(), record.depth_m()
+    size = (record.camera.height, record.camera.width)
+    for what, shape, suffix in (("picture", image.shape, ".jpg"), ("depth", depth.shape, ".png")):
+        if shape[:2] != size or len(shape) != (3 if what == "picture" else 2):
+            raise EvaluationError(
+                f"the {what} {record.folder / (record.name + suffix)} has the shape {shape}, its camera is "
+                f"{size[1]}x{size[0]}: remove the folder {record.folder} and it is rendered again"
+            )
+    return NewFrame(image, depth, record.camera, record.mount, record.attitude, record.height_m)
 
 
 def _numbered(

@@ -1,28 +1,19 @@
-"""The result of an evaluation: as JSON and as tables."""
+"""The result of an evaluation as plain values, for files and for model cards."""
 
 from __future__ import annotations
 
 import platform
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rich.table import Table
+from training.evaluation import FrameErrors
+from training.evaluation_summary import SourceSummary, elements_json, metrics_json, summarise
+from training.metrics import DEPTH_CAP_M, SMALLEST_DEPTH_M, DepthMetrics
 
-from training.data.seed_split import SeedSplit
-from training.evaluation import FrameErrors, Method, MethodSummary, summarise
-from training.metrics import DEPTH_CAP_M, DepthMetrics
-
-_COLUMNS = (
-    ("Abs Rel", "abs_rel"),
-    ("Sq Rel", "sq_rel"),
-    ("RMSE", "rmse"),
-    ("RMSE log", "rmse_log"),
-    ("<1.25", "below_125"),
-    ("<1.25^2", "below_125_2"),
-    ("<1.25^3", "below_125_3"),
-)
+SEEN, HELD_OUT = "seen", "held_out"
+"""Kinds of scene that training had, with other seeds; and kinds that it never had."""
 
 
 @dataclass(frozen=True)
@@ -31,70 +22,99 @@ class EvaluationReport:
 
     Args:
         model, provider: what was measured and what ran it.
-        split: what the seeds are kept for.
-        scenes, seeds, frames_per_seed: which frames.
+        hints: that the network takes.
+        data: what it was measured on, as a sentence.
+        details: what else tells which frames they were; plain values.
+        labels: sources in the order of the tables.
+        networks: those of them that are the network.
+        parts: names of the groups of frames that are reported together, such as the seen kinds of scene.
         errors: of each frame.
         date: when, ISO 8601.
+        note: what a reader must know, or empty.
     """
 
     model: str
     provider: str
-    split: SeedSplit
-    scenes: tuple[str, ...]
-    seeds: tuple[int, ...]
-    frames_per_seed: int
+    hints: tuple[str, ...]
+    data: str
+    details: Mapping[str, Any]
+    labels: tuple[str, ...]
+    networks: tuple[str, ...]
+    parts: Mapping[str, tuple[str, ...]]
     errors: Sequence[FrameErrors]
     date: str
+    note: str = ""
+    skipped: Sequence[str] = field(default=())
 
-    def of_scene(self, scene: str) -> list[FrameErrors]:
-        """Errors of one scene's frames."""
-        return [item for item in self.errors if item.scene == scene]
+    def of(self, groups: Sequence[str]) -> list[FrameErrors]:
+        """Errors of the frames of some groups."""
+        return [item for item in self.errors if item.group in groups]
+
+    def summaries(self, errors: Sequence[FrameErrors]) -> list[SourceSummary]:
+        """Each source that had an answer to any of the frames."""
+        return [row for row in summarise(errors, self.labels) if row.frames]
 
     def as_json(self) -> dict[str, Any]:
         """Everything but single frames, as plain values."""
+        groups = [group for part in self.parts.values() for group in part]
         return {
             "model": self.model,
             "provider": self.provider,
+            "hints": list(self.hints),
             "machine": machine_text(),
             "date": self.date,
-            "split": self.split.name.lower(),
-            "scenes": list(self.scenes),
-            "seeds": list(self.seeds),
-            "frames_per_seed": self.frames_per_seed,
-            "depth_cap_m": DEPTH_CAP_M,
-            "overall": _group(self.errors),
-            "by_scene": {scene: _group(self.of_scene(scene)) for scene in self.scenes},
-            "summary": self._summary(),
+            "data": self.data,
+            **self.details,
+            "note": self.note,
+            "depth_m": [SMALLEST_DEPTH_M, DEPTH_CAP_M],
+            "frames_without_truth": [item.name for item in self.errors if not item.sources],
+            "skipped": list(self.skipped),
+            "overall": self._group(self.errors),
+            "parts": {
+                name: {"groups": list(part), **self._group(self.of(part))}
+                for name, part in self.parts.items()
+            },
+            "by_group": {group: self._brief(self.of([group])) for group in groups},
+            "summary": self.card_summary(),
         }
 
-    def _summary(self) -> dict[str, Any]:
-        """What a model card tells."""
-        rows = {row.method: row for row in summarise(self.errors)}
-        network, ground, there = (
-            rows[method] for method in (Method.NETWORK, Method.GROUND_SCALED, Method.NETWORK_THERE)
-        )
+    def card_summary(self) -> dict[str, Any]:
+        """What a model card tells: the network's errors on each part of the data, and the baselines'."""
+        summary: dict[str, Any] = {"data": self.data, "date": self.date, "frames": len(self.errors)}
+        if self.note:
+            summary["note"] = self.note
+        for name, part in self.parts.items():
+            rows = self.summaries(self.of(part))
+            summary[name] = {
+                "groups": list(part),
+                **{row.label: _card_row(row) for row in rows if row.label in self.networks},
+                "baselines_abs_rel": {
+                    row.label: {"median_scaled": _abs_rel(row.scaled), "metric": _abs_rel(row.metric)}
+                    for row in rows
+                    if row.label not in self.networks
+                },
+            }
+        return summary
+
+    def _group(self, errors: Sequence[FrameErrors]) -> dict[str, Any]:
         return {
-            "data": (
-                f"rendered frames of {self.split.name.lower()} seeds {_ranges(self.seeds)} of "
-                f"{', '.join(self.scenes)}, depth below {DEPTH_CAP_M:g} m"
-            ),
-            "date": self.date,
-            "frames": network.frames,
-            "median_scaled": _numbers(network.scaled),
-            "unscaled": _numbers(network.unscaled),
-            "scaled_by_ground": _numbers(ground.unscaled),
-            "frames_scaled_by_ground": ground.frames,
-            "unscaled_on_those_frames": _numbers(there.unscaled),
-            "median_scaled_constant_depth_abs_rel": _abs_rel(rows[Method.CONSTANT].scaled),
-            "median_scaled_flat_ground_abs_rel": _abs_rel(rows[Method.FLAT_GROUND].scaled),
+            "frames": len(errors),
+            "mean_points": mean_points(errors),
+            "sources": {row.label: row.as_json() for row in self.summaries(errors)},
         }
 
-    def tables(self) -> list[Table]:
-        """One table for each scene and one for all, median-scaled and unscaled."""
-        groups = [(scene, self.of_scene(scene)) for scene in self.scenes]
-        if len(groups) > 1:
-            groups.append(("all", list(self.errors)))
-        return [_table(name, errors) for name, errors in groups]
+    def _brief(self, errors: Sequence[FrameErrors]) -> dict[str, Any]:
+        return {
+            "frames": len(errors),
+            "sources": {row.label: _card_row(row) for row in self.summaries(errors)},
+        }
+
+
+def mean_points(errors: Sequence[FrameErrors]) -> dict[str, float]:
+    """How many points there were on average, by the number that was asked for."""
+    counts = dict.fromkeys(count for item in errors for count in item.points)
+    found = {count: [item.points[count] for item in errors if count in item.points] for count in counts}
+    return {str(count): round(sum(numbers) / len(numbers), 1) for count, numbers in found.items()}
 
 
 def machine_text() -> str:
@@ -112,59 +132,21 @@ def _processor() -> str:
     return platform.processor() or "unknown processor"
 
 
-def _group(errors: Sequence[FrameErrors]) -> dict[str, Any]:
-    methods = {
-        row.method.name.lower(): {
-            "frames": row.frames,
-            "median_scaled": _numbers(row.scaled),
-            "unscaled": _numbers(row.unscaled),
-        }
-        for row in summarise(errors)
+def _card_row(row: SourceSummary) -> dict[str, Any]:
+    values: dict[str, Any] = {
+        "frames": row.frames,
+        "median_scaled": metrics_json(row.scaled),
+        "metric": metrics_json(row.metric),
     }
-    return {
-        "frames": len(errors),
-        "methods": methods,
-        "median_factor": _mean([item.median_factor for item in errors]),
-        "within_one_sigma": _mean([item.within_sigma for item in errors]),
-    }
-
-
-def _table(name: str, errors: Sequence[FrameErrors]) -> Table:
-    table = Table(title=f"{name}: {len(errors)} frames", title_justify="left")
-    for heading in ("depth from", "frames", "scale", *(heading for heading, _ in _COLUMNS)):
-        table.add_column(heading, justify="left" if heading in ("depth from", "scale") else "right")
-    rows = summarise(errors)
-    for row in rows:
-        if row.method not in (Method.GROUND_SCALED, Method.NETWORK_THERE):
-            table.add_row(*_cells(row, "median", row.scaled))
-    table.add_section()
-    for row in rows:
-        table.add_row(*_cells(row, "metres", row.unscaled))
-    return table
-
-
-def _cells(row: MethodSummary, scale: str, metrics: DepthMetrics | None) -> list[str]:
-    numbers = (
-        ["-"] * len(_COLUMNS) if metrics is None else [f"{getattr(metrics, key):.3f}" for _, key in _COLUMNS]
-    )
-    return [row.method.value, str(row.frames), scale, *numbers]
-
-
-def _numbers(metrics: DepthMetrics | None) -> dict[str, float] | None:
-    return None if metrics is None else {key: round(value, 4) for key, value in metrics.as_dict().items()}
+    doubt, elements = row.doubt, row.elements
+    if doubt is not None:
+        sigma = doubt.as_json()
+        values["within_one_sigma"] = sigma["within_one_sigma"]
+        values["surest_half_over_all"] = sigma["per_picture"]["surest_half_over_all"]
+    if elements is not None:
+        values["nearest_obstacle"] = elements_json(elements)
+    return values
 
 
 def _abs_rel(metrics: DepthMetrics | None) -> float | None:
     return None if metrics is None else round(metrics.abs_rel, 4)
-
-
-def _mean(values: Sequence[float | None]) -> float | None:
-    known = [value for value in values if value is not None]
-    return round(sum(known) / len(known), 4) if known else None
-
-
-def _ranges(seeds: Sequence[int]) -> str:
-    """Whole numbers as text: 1000 to 1005, or each by itself."""
-    if len(seeds) > 2 and list(seeds) == list(range(seeds[0], seeds[-1] + 1)):
-        return f"{seeds[0]} to {seeds[-1]}"
-    return ", ".join(str(seed) for seed in seeds)

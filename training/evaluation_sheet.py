@@ -172,7 +172,7 @@ def _legend(with_sigma: bool) -> NDArray[np.uint8]:
     depth_colors = colorize_depth(depth, _NEAR_M, _FAR_M)
     ones = np.ones_like(depth)
     parts = [
-        ("camera", None),
+        ("camera; grey elsewhere: not known", None),
         (f"truth: {_NEAR_M:g} m (light) to {_FAR_M:g} m", depth_colors),
         (f"prediction: {_NEAR_M:g} m (light) to {_FAR_M:g} m", depth_colors),
         ("error: said too near (blue), too far (red)", _error_colors(ones, ratio.astype(np.float32))),
