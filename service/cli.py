@@ -52,6 +52,15 @@ COMMANDS = {
     ),
     "benchmark": Command("service.benchmark.command", "benchmark", "Measure speed and memory."),
     "train": Command("training.commands", "train", "Train a depth network.", "train"),
+    "train-video": Command(
+        "training.selfsupervised.command", "train_video", "Train depth from video alone.", "train"
+    ),
+    "networks": Command(
+        "training.networks_command", "networks", "Parameters and operations of every network.", "train"
+    ),
+    "compare": Command(
+        "training.comparison.command", "compare_app", "Repeat the paper's comparison.", "train", is_group=True
+    ),
     "evaluate": Command("training.commands", "evaluate", "Measure a depth network's errors.", "train"),
     "export": Command(
         "training.commands", "export", "Write a trained network as ONNX with its card.", "train"

@@ -1,0 +1,1 @@
+"""Training from video alone: a depth and a pose network taught by re-projection."""
