@@ -1,4 +1,4 @@
-"""The depth network: a picture in, depth at the camera's pixels out."""
+"""The depth network: a picture and what the vehicle knows in, depth at the camera's pixels out."""
 
 from __future__ import annotations
 
@@ -12,11 +12,16 @@ from numpy.typing import NDArray
 from uavdepth.camera import CameraModel
 from uavdepth.depth_map import DepthMap
 from uavdepth.errors import ImageSizeError, ModelCardError, ModelFileError
+from uavdepth.hint_planes import ground_plane, point_planes
+from uavdepth.hints import Hints
 from uavdepth.inference import InferenceSession, open_session
-from uavdepth.model_card import CARD_FILE_SUFFIX, CARD_METADATA_KEY, ModelCard
+from uavdepth.model_card import ModelCard
+from uavdepth.network_file import WEIGHTS_FOLDER, find_network, network_problems, read_card
 
-WEIGHTS_FOLDER = Path(__file__).parent / "weights"
-"""Networks that ship with the package: `<name>.onnx`."""
+__all__ = ["WEIGHTS_FOLDER", "DepthModel"]
+
+RELATIVE_REACH = 1e4
+"""Relative inverse depth of 0 is "as far as can be": it is taken for so many times the nearest depth."""
 
 
 class DepthModel:
@@ -30,43 +35,61 @@ class DepthModel:
     def __init__(self, inference: InferenceSession, card: ModelCard, source: str) -> None:
         self._session: Any = inference.session
         self._output_names = [card.output_name] + ([card.uncertainty_name] if card.uncertainty else [])
-        self._gain = tuple(1.0 / (255.0 * std) for std in card.std)
-        self._offset = tuple(-mean / std for mean, std in zip(card.mean, card.std, strict=True))
+        # Channel numbers are those of the BGR picture, in the order that the network wants them.
+        self._channels = (2, 1, 0) if card.channel_order == "rgb" else (0, 1, 2)
+        self._gain = [np.float32(1.0 / (255.0 * card.std[2 - channel])) for channel in self._channels]
+        self._offset = [np.float32(-card.mean[2 - c] / card.std[2 - c]) for c in self._channels]
+        self._is_half = any(
+            item.name == card.input_name and item.type == "tensor(float16)"
+            for item in inference.session.get_inputs()
+        )
         self.card = card
         self.source = source
         self.provider = inference.provider
-        """ "cpu" or "openvino": what really runs the network."""
+        """ "tensorrt", "cuda", "openvino" or "cpu": what really runs the network."""
+        self.precision = inference.precision
+        """ "fp32" or "bf16": the number format that it computes in."""
         self.fallback_reason = inference.fallback_reason
-        """Why provider "auto" did not take OpenVINO, or None."""
+        """Why provider "auto" did not take a better one that is installed, or None."""
 
     @classmethod
     def load(
-        cls, path_or_name: str | Path = "default", provider: str = "auto", threads: int | None = None
+        cls,
+        path_or_name: str | Path = "default",
+        provider: str = "auto",
+        threads: int | None = None,
+        card: str | Path | None = None,
     ) -> DepthModel:
         """Load a network and its card.
 
         Args:
             path_or_name: an ONNX file, or the name of a network that ships with the package.
-            provider: "auto", "cpu" or "openvino".
+            provider: "auto", "tensorrt", "cuda", "openvino" or "cpu".
             threads: threads for inference; None: one for each core.
+            card: a TOML card for a foreign network. None: the card inside the file, else `FILE.onnx.toml`.
 
         Raises:
             ModelFileError: the file is missing, is not an ONNX network, or the provider cannot run it.
             ModelCardError: no card in the file or beside it, a card with a missing, unknown or
                 impossible key, or a card that does not describe this network.
         """
-        path = _find(path_or_name)
+        path = find_network(path_or_name)
         inference = open_session(path, provider, threads)
-        card = _read_card(inference.session, path)
-        _check_network(inference.session, card, path)
-        return cls(inference, card, str(path))
+        read = read_card(inference.session, path, None if card is None else Path(card))
+        problems = network_problems(inference.session, read)
+        if problems:
+            raise ModelCardError(f"{path}: " + "; ".join(problem.text for problem in problems))
+        return cls(inference, read, str(path))
 
-    def infer(self, image_bgr: NDArray[np.uint8], camera: CameraModel) -> DepthMap:
+    def infer(
+        self, image_bgr: NDArray[np.uint8], camera: CameraModel, hints: Hints | None = None
+    ) -> DepthMap:
         """Depth of one picture.
 
         Depth is clipped to the card's max_depth_m, so that a value of max_depth_m reads "there or
         beyond": the network never claims that nothing stands somewhere, and +inf never leaves it. A
-        prediction that is not finite is unknown.
+        prediction that is not finite is unknown. Depth of a network that is not metric is in a unit of
+        its own, and inverse depth up to scale and shift is no depth yet: see `DepthMap`.
 
         The answer is brought to the camera's pixels by nearest neighbour: between an obstacle at 5 m
         and a background at 50 m interpolation would invent surfaces at 16 m.
@@ -74,109 +97,100 @@ class DepthModel:
         Args:
             image_bgr: (H, W, 3) uint8 picture of this camera, not undistorted.
             camera: the camera, in the pixels of the picture.
+            hints: what the vehicle knows. Those that the network does not take are left out, and it
+                works without those that are not given.
 
         Raises:
             ImageSizeError: the picture's size is not the camera's, or it is not an 8-bit BGR picture.
+            ModelFileError: an output that is no picture of numbers.
         """
         _check_picture(image_bgr, camera)
-        outputs = self._session.run(self._output_names, {self.card.input_name: self._prepare(image_bgr)})
+        width, height = self.card.input_size(camera)
+        inputs: dict[str, NDArray[Any]] = {self.card.input_name: self._prepare(image_bgr, width, height)}
+        if self.card.hints:
+            inputs.update(self._planes(hints or Hints(), camera))
+        outputs = self._session.run(self._output_names, inputs)
 
-        focal_px = camera.fx * self.card.input_width / camera.width
-        depth = self._metres(outputs[0][0, 0], focal_px)
+        values = self._rows_and_columns(outputs[0])
+        if self.card.output == "affine_inverse_depth":
+            values = np.where(np.isfinite(values), values, np.float32(np.nan))
+            return DepthMap.from_affine(_to_pixels_of(camera, values))
+        depth = self._depth(values, camera.fx * width / camera.width)
         sigma = None
         if self.card.uncertainty:
             with np.errstate(over="ignore"):
-                sigma = np.exp(outputs[1][0, 0], dtype=np.float32)
-            sigma[~np.isfinite(sigma) | np.isnan(depth)] = np.nan
+                sigma = np.exp(self._rows_and_columns(outputs[1]), dtype=np.float32)
             sigma = _to_pixels_of(camera, sigma)
-        return DepthMap(_to_pixels_of(camera, depth), sigma)
+        depth = _to_pixels_of(camera, depth)
+        if sigma is not None:
+            sigma[~np.isfinite(sigma) | np.isnan(depth)] = np.nan
+        return DepthMap(depth, sigma)
 
-    def _prepare(self, image_bgr: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """(1, 3, h, w) float32 input: resized, RGB, normalised as the card says."""
-        width, height = self.card.input_width, self.card.input_height
+    def _prepare(self, image_bgr: NDArray[np.uint8], width: int, height: int) -> NDArray[Any]:
+        """(1, 3, h, w) or (1, h, w, 3) input: resized and normalised as the card says."""
         if image_bgr.shape[:2] != (height, width):
             # Area averaging: the only resize that does not alias fine texture when shrinking.
             image_bgr = np.asarray(cv2.resize(image_bgr, (width, height), interpolation=cv2.INTER_AREA))
-        picture = np.empty((1, 3, height, width), dtype=np.float32)
-        for channel in range(3):
-            plane = picture[0, channel]
-            np.multiply(image_bgr[:, :, 2 - channel], np.float32(self._gain[channel]), out=plane)
-            plane += np.float32(self._offset[channel])
-        return picture
+        is_last = self.card.layout == "nhwc"
+        picture = np.empty((height, width, 3) if is_last else (3, height, width), dtype=np.float32)
+        for number, channel in enumerate(self._channels):
+            plane = picture[..., number] if is_last else picture[number]
+            np.multiply(image_bgr[:, :, channel], self._gain[number], out=plane)
+            plane += self._offset[number]
+        return picture[None].astype(np.float16) if self._is_half else picture[None]
 
-    def _metres(self, output: NDArray[np.float32], focal_px: float) -> NDArray[np.float32]:
-        """(h, w) float32 z-depth of the raw depth output; the three formulas of `ModelCard`."""
-        ratio = np.float32(focal_px / self.card.focal_px)
+    def _planes(self, hints: Hints, camera: CameraModel) -> dict[str, NDArray[np.float32]]:
+        """The hints' inputs, 0 everywhere for those that are not given."""
+        card = self.card
+        width, height, focal_px = card.input_width, card.input_height, card.focal_px or 1.0
+        planes = {}
+        if "ground" in card.hints:
+            ground = np.zeros((1, height, width), dtype=np.float32)
+            if hints.ground is not None:
+                ground[0] = ground_plane(hints.ground, camera, width, height, focal_px)
+            planes[card.ground_name] = ground[None]
+        if "points" in card.hints:
+            points = np.zeros((2, height, width), dtype=np.float32)
+            if hints.points is not None:
+                points = point_planes(hints.points, camera, width, height, focal_px)
+            planes[card.points_name] = points[None]
+        return planes
+
+    def _rows_and_columns(self, output: NDArray[Any]) -> NDArray[np.float32]:
+        """(h, w) float32 of an output, whatever axes of length 1 it has."""
+        sides = [side for side in np.shape(output) if side != 1]
+        if len(sides) != 2 or 0 in sides:
+            raise ModelFileError(
+                f"{self.source}: the network's output is {np.shape(output)}: rows and columns are needed"
+            )
+        return np.asarray(output, dtype=np.float32).reshape(sides)
+
+    def _depth(self, output: NDArray[np.float32], focal_px: float) -> NDArray[np.float32]:
+        """(h, w) float32 z-depth of the raw depth output; the formulas of `ModelCard`."""
+        card = self.card
+        ratio = np.float32(1.0 if card.focal_px is None else focal_px / card.focal_px)
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-            if self.card.output == "log_inverse_depth":
+            if card.output == "log_inverse_depth":
                 depth = np.exp(-output) * ratio
-            elif self.card.output == "inverse_depth":
+            elif card.output == "inverse_depth":
                 depth = ratio / output
-            else:
+            elif card.output == "depth":
                 depth = output * ratio
-            np.minimum(depth, np.float32(self.card.max_depth_m), out=depth)
+            else:
+                depth = _relative_depth(output)
+            if card.max_depth_m is not None:
+                np.minimum(depth, np.float32(card.max_depth_m), out=depth)
             # Depth 0 is where a prediction ran off the scale: no more to be believed than NaN.
-            depth[~(np.isfinite(output) & (depth > 0))] = np.nan
+            depth[~(np.isfinite(output) & np.isfinite(depth) & (depth > 0))] = np.nan
         return np.asarray(depth, dtype=np.float32)
 
 
-def _find(path_or_name: str | Path) -> Path:
-    text = str(path_or_name)
-    if isinstance(path_or_name, str) and text and not Path(text).suffix and Path(text).name == text:
-        path = WEIGHTS_FOLDER / f"{text}.onnx"
-        if not path.is_file() and not Path(text).is_file():
-            known = sorted(file.stem for file in WEIGHTS_FOLDER.glob("*.onnx"))
-            raise ModelFileError(
-                f"there is no network named {text!r}; named ones are: {', '.join(known) or 'none'}; "
-                "give a file by its path, with its suffix"
-            )
-        return path if path.is_file() else Path(text)
-    return Path(path_or_name)
-
-
-def _read_card(session: Any, path: Path) -> ModelCard:
-    text = session.get_modelmeta().custom_metadata_map.get(CARD_METADATA_KEY)
-    if text is not None:
-        return ModelCard.from_json(text, str(path))
-    beside = Path(f"{path}{CARD_FILE_SUFFIX}")
-    try:
-        return ModelCard.from_json(beside.read_bytes(), str(beside))
-    except FileNotFoundError as error:
-        raise ModelCardError(
-            f"{path}: the metadata key '{CARD_METADATA_KEY}' is missing, "
-            f"and there is no {beside.name} beside it"
-        ) from error
-    except OSError as error:
-        raise ModelCardError(f"{beside}: cannot be read: {error.strerror}") from error
-
-
-def _check_network(session: Any, card: ModelCard, path: Path) -> None:
-    """Refuse a card that was written for another network."""
-    inputs = {item.name: item for item in session.get_inputs()}
-    outputs = {item.name for item in session.get_outputs()}
-    if set(inputs) != {card.input_name}:
-        raise ModelCardError(
-            f"{path}: the card's input_name is '{card.input_name}', the network's inputs are {sorted(inputs)}"
-        )
-    needed = [("output_name", card.output_name)]
-    if card.uncertainty:
-        needed.append(("uncertainty_name", card.uncertainty_name))
-    for key, name in needed:
-        if name not in outputs:
-            raise ModelCardError(
-                f"{path}: the card's {key} is '{name}', the network's outputs are {sorted(outputs)}"
-            )
-    picture = inputs[card.input_name]
-    if picture.type != "tensor(float)":
-        raise ModelCardError(f"{path}: the network's input is {picture.type}: float32 is needed")
-    wanted = [1, 3, card.input_height, card.input_width]
-    fits = len(picture.shape) == 4 and all(
-        not isinstance(size, int) or size == want for size, want in zip(picture.shape, wanted, strict=True)
-    )
-    if not fits:
-        raise ModelCardError(
-            f"{path}: the card asks for an input of {wanted}, the network's is {picture.shape}"
-        )
+def _relative_depth(inverse: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Depth up to a factor; inverse depth of 0 and below is the far end, not infinity."""
+    largest = np.max(inverse, where=np.isfinite(inverse), initial=0.0)
+    if largest <= 0:
+        return np.full_like(inverse, np.nan)
+    return np.asarray(1.0 / np.maximum(inverse, largest / np.float32(RELATIVE_REACH)), dtype=np.float32)
 
 
 def _check_picture(image_bgr: NDArray[np.uint8], camera: CameraModel) -> None:

@@ -23,6 +23,10 @@ class ModelFileError(UavDepthError):
     """A network file that is missing or that ONNX Runtime cannot load."""
 
 
+class ProviderFallbackWarning(UserWarning):
+    """A network runs, but not on the fastest provider that is installed."""
+
+
 class HintError(UavDepthError, ValueError):
     """A ground or point hint with numbers that no scene has."""
 

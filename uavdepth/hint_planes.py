@@ -115,7 +115,7 @@ def _along(
     resized = camera.scaled(width, height)
     x = direction[0] * (np.arange(width) - resized.cx) / resized.fx
     y = direction[1] * (np.arange(height) - resized.cy) / resized.fy + direction[2]
-    return np.add(x.astype(np.float32)[None, :], y.astype(np.float32)[:, None])
+    return np.asarray(x.astype(np.float32)[None, :] + y.astype(np.float32)[:, None], dtype=np.float32)
 
 
 @lru_cache(maxsize=8)

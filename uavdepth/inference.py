@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-import json
-import tempfile
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
-from uavdepth.errors import ModelFileError
+from uavdepth.errors import ModelFileError, ProviderFallbackWarning
+from uavdepth.providers import PROVIDERS, ProviderUnavailableError, runtime_errors
 
-if TYPE_CHECKING:
-    import onnxruntime
-
-Provider = Literal["auto", "cpu", "openvino"]
-"""auto: OpenVINO where its plug-in is installed and takes the network, else ONNX Runtime's own CPU code."""
-
-_OPENVINO_PROVIDER = "OpenVINOExecutionProvider"
-
-_OPENVINO_LIBRARY = "uavdepth_openvino"
-"""Name under which the plug-in is registered with ONNX Runtime, once a process."""
+Provider = Literal["auto", "tensorrt", "cuda", "openvino", "cpu"]
+"""auto: the first of the others that is installed and takes the network."""
 
 
 @dataclass(frozen=True)
@@ -28,12 +20,14 @@ class InferenceSession:
 
     Args:
         session: the `onnxruntime.InferenceSession`.
-        provider: "cpu" or "openvino", the one that really runs it.
-        fallback_reason: why "auto" did not take OpenVINO, or None.
+        provider: "tensorrt", "cuda", "openvino" or "cpu": the one that really runs it.
+        precision: number format that it computes in, "fp32" or "bf16".
+        fallback_reason: why "auto" did not take a better provider that is installed, or None.
     """
 
     session: Any
     provider: str
+    precision: str = "fp32"
     fallback_reason: str | None = None
 
 
@@ -42,12 +36,15 @@ def open_session(path: Path, provider: str, threads: int | None) -> InferenceSes
 
     Args:
         path: the file.
-        provider: "auto", "cpu" or "openvino".
+        provider: "auto" or the name of one of `PROVIDERS`.
         threads: threads for inference; None: one for each core.
 
     Raises:
-        ModelFileError: no such file, not an ONNX network, an unknown provider, threads below 1, or
-            "openvino" asked for where the plug-in is missing or refuses the network.
+        ModelFileError: no such file, not an ONNX network, an unknown provider, threads below 1, or a
+            provider asked for by name that is missing or refuses the network.
+
+    Warns:
+        ProviderFallbackWarning: once, where "auto" ends with a slower provider than those installed.
     """
     if provider not in get_args(Provider):
         raise ModelFileError(f"provider is {provider!r}: one of {', '.join(get_args(Provider))} is needed")
@@ -55,94 +52,39 @@ def open_session(path: Path, provider: str, threads: int | None) -> InferenceSes
         raise ModelFileError(f"threads is {threads}: at least 1 is needed")
     if not path.is_file():
         raise ModelFileError(f"{path}: no such network file")
-
-    reason = None
-    if provider in ("auto", "openvino"):
+    if provider != "auto":
         try:
-            return InferenceSession(_openvino_session(path, threads), "openvino")
-        except _OpenVinoUnavailableError as error:
-            if provider == "openvino":
-                raise ModelFileError(f"{path}: {error}") from error
-            reason = str(error)
-    return InferenceSession(_cpu_session(path, threads), "cpu", reason)
+            return _open(provider, path, threads)
+        except ProviderUnavailableError as error:
+            raise ModelFileError(f"{path}: {error}") from error
+    reasons = []
+    for name, candidate in PROVIDERS.items():
+        if not candidate.is_installed():
+            continue
+        try:
+            opened = _open(name, path, threads)
+        except ProviderUnavailableError as error:
+            reasons.append(str(error))
+            continue
+        if not reasons:
+            return opened
+        reason = "; ".join(reasons)
+        title = PROVIDERS[name].title
+        warnings.warn(f"{path.name} runs on {title}: {reason}", ProviderFallbackWarning, stacklevel=3)
+        return InferenceSession(opened.session, name, opened.precision, reason)
+    raise ModelFileError(f"{path}: {reasons[-1]}")
 
 
-class _OpenVinoUnavailableError(Exception):
-    """OpenVINO cannot run this network here; the text says why."""
-
-
-def _cpu_session(path: Path, threads: int | None) -> Any:
-    import onnxruntime as ort
-
+def _open(name: str, path: Path, threads: int | None) -> InferenceSession:
+    """The session; every failure of ONNX Runtime becomes `ProviderUnavailableError`, by the provider's name."""
+    provider = PROVIDERS[name]
     try:
-        return ort.InferenceSession(str(path), _options(ort, threads), providers=["CPUExecutionProvider"])
-    except _runtime_errors() as error:
-        raise ModelFileError(f"{path}: ONNX Runtime cannot load it: {_first_line(error)}") from error
-
-
-def _options(ort: Any, threads: int | None) -> onnxruntime.SessionOptions:
-    options = ort.SessionOptions()
-    options.log_severity_level = 3
-    options.intra_op_num_threads = threads or 0
-    options.inter_op_num_threads = 1
-    # Idle inference threads must not spin: the camera and the MAVLink link share these cores.
-    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
-    # The arena keeps the largest footprint it ever had; without it the peak is given back.
-    options.enable_cpu_mem_arena = False
-    return options
-
-
-def _openvino_session(path: Path, threads: int | None) -> Any:
-    import onnxruntime as ort
-
-    try:
-        import onnxruntime_ep_openvino as plugin
-    except ImportError as error:
-        raise _OpenVinoUnavailableError(
-            "the OpenVINO plug-in is not installed (pip install 'uavdepth[openvino]')"
-        ) from error
-    try:
-        devices = _openvino_cpu_devices(ort)
-        if not devices:
-            ort.register_execution_provider_library(_OPENVINO_LIBRARY, plugin.get_library_path())
-            devices = _openvino_cpu_devices(ort)
-        if not devices:
-            raise _OpenVinoUnavailableError("the OpenVINO plug-in offers no CPU device")
-        options = _options(ort, threads)
-        # Without this ONNX Runtime would silently run on its own what OpenVINO does not take.
-        options.add_session_config_entry("session.disable_cpu_ep_fallback", "1")
-        with tempfile.TemporaryDirectory() as folder:
-            options.add_provider_for_devices(devices, _openvino_options(Path(folder), threads))
-            return ort.InferenceSession(str(path), options)
-    except _runtime_errors() as error:
-        raise _OpenVinoUnavailableError(f"OpenVINO cannot run it: {_first_line(error)}") from error
-
-
-def _openvino_cpu_devices(ort: Any) -> list[Any]:
-    return [
-        device
-        for device in ort.get_ep_devices()
-        if device.ep_name == _OPENVINO_PROVIDER and device.device.type == ort.OrtHardwareDeviceType.CPU
-    ]
-
-
-def _openvino_options(folder: Path, threads: int | None) -> dict[str, str]:
-    config: dict[str, Any] = {"PERFORMANCE_HINT": "LATENCY", "NUM_STREAMS": "1"}
-    if threads is not None:
-        config["INFERENCE_NUM_THREADS"] = str(threads)
-    file = folder / "openvino.json"
-    file.write_text(json.dumps({"CPU": config}), encoding="utf-8")
-    return {"load_config": str(file)}
-
-
-def _runtime_errors() -> tuple[type[Exception], ...]:
-    """Every error that ONNX Runtime raises: its classes share no base but Exception."""
-    from onnxruntime.capi import onnxruntime_pybind11_state as state
-
-    own = [
-        value for value in vars(state).values() if isinstance(value, type) and issubclass(value, Exception)
-    ]
-    return (*own, RuntimeError, ValueError)
+        opened = provider.open(path, threads)
+    except ProviderUnavailableError as error:
+        raise ProviderUnavailableError(f"{provider.title} cannot be used: {error}") from error
+    except runtime_errors() as error:
+        raise ProviderUnavailableError(f"{provider.title} cannot load it: {_first_line(error)}") from error
+    return InferenceSession(opened.session, name, opened.precision)
 
 
 def _first_line(error: Exception) -> str:

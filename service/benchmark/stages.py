@@ -55,6 +55,7 @@ class _Stopwatch:
 
     def __init__(self, session: Any) -> None:
         self._session = session
+        self.get_inputs = session.get_inputs
         self.last_ms = 0.0
 
     def run(self, *arguments: Any) -> Any:

@@ -39,6 +39,16 @@ def card_values(**changes: Any) -> dict[str, Any]:
     return {key: value for key, value in values.items() if value is not None}
 
 
+def write_toml_card(path: Path, values: dict[str, Any]) -> Path:
+    """A card as a TOML file; TOML writes simple values as JSON does, and tables under their names."""
+    tables = {key: value for key, value in values.items() if isinstance(value, dict)}
+    lines = [f"{key} = {json.dumps(value)}" for key, value in values.items() if key not in tables]
+    for key, table in tables.items():
+        lines += [f"[{key}]", *(f"{name} = {json.dumps(value)}" for name, value in table.items())]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
 def write_red_network(
     path: Path,
     card: dict[str, Any] | None,

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import importlib.util
-import json
 import math
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-from onnx_files import HEIGHT, MEAN, STD, WIDTH, card_values, write_red_network
+from onnx_files import HEIGHT, MEAN, STD, WIDTH, card_values, write_red_network, write_toml_card
 
 from uavdepth import CameraModel, DepthModel, ImageSizeError, ModelCardError, ModelFileError
 
@@ -129,7 +128,7 @@ class TestFiles:
     def test_a_file_without_a_card_is_refused_by_the_missing_key(self, tmp_path):
         path = write_red_network(tmp_path / "bare.onnx", None)
         with pytest.raises(
-            ModelCardError, match=r"bare\.onnx.*'uavdepth\.card' is missing.*bare\.onnx\.card\.json"
+            ModelCardError, match=r"bare\.onnx.*'uavdepth\.card' is missing.*bare\.onnx\.toml"
         ):
             DepthModel.load(path, provider="cpu")
 
@@ -139,14 +138,14 @@ class TestFiles:
 
     def test_a_foreign_network_takes_the_card_beside_it(self, tmp_path, camera):
         path = write_red_network(tmp_path / "foreign.onnx", None)
-        (tmp_path / "foreign.onnx.card.json").write_text(json.dumps(card_values(name="foreign")))
+        write_toml_card(tmp_path / "foreign.onnx.toml", card_values(name="foreign"))
         model = DepthModel.load(path, provider="cpu")
         assert model.card.name == "foreign"
         assert np.isfinite(model.infer(red(9), camera).depth_m).all()
 
     def test_the_networks_own_card_wins_over_the_one_beside_it(self, tmp_path):
         path = network(tmp_path, name="inside")
-        Path(f"{path}.card.json").write_text(json.dumps(card_values(name="beside")))
+        write_toml_card(Path(f"{path}.toml"), card_values(name="beside"))
         assert DepthModel.load(path, provider="cpu").card.name == "inside"
 
     @pytest.mark.parametrize(
@@ -187,7 +186,7 @@ class TestFiles:
 
     @pytest.mark.parametrize(
         ("settings", "text"),
-        [({"provider": "cuda"}, "provider is 'cuda'"), ({"threads": 0}, "threads is 0")],
+        [({"provider": "npu"}, "provider is 'npu'"), ({"threads": 0}, "threads is 0")],
     )
     def test_impossible_settings_are_refused_by_value(self, tmp_path, settings, text):
         with pytest.raises(ModelFileError, match=text):

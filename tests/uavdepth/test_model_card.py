@@ -29,7 +29,7 @@ def test_each_missing_key_is_named_with_the_file(key):
 @pytest.mark.parametrize(
     ("key", "value"),
     [
-        ("card_version", 2),
+        ("card_version", 3),
         ("input_width", 0),
         ("input_width", 384.5),
         ("input_height", "192"),
