@@ -41,5 +41,6 @@ def write_figure(folder: Path) -> Path:
             axis.tick_params(labelsize=6)
             axis.spines[["top", "right"]].set_visible(False)
     path = folder.parent / FIGURE
-    FigureCanvasAgg(figure).print_png(str(path))
+    FigureCanvasAgg(figure)
+    figure.savefig(path)
     return path

@@ -18,7 +18,7 @@ from training.encoder_distillation import EncoderDistillation
 from training.errors import CheckpointError
 from training.evaluation_report import machine_text
 from training.networks.catalogue import build_network
-from training.networks.counting import count_network
+from training.networks.counting import count_multiply_adds, count_parameters
 from training.selfsupervised import command
 from training.selfsupervised.frames import open_triplets
 from training.selfsupervised.run_state import RunState
@@ -107,13 +107,13 @@ def measure_run(folder: Path, data: Path) -> ComparisonResult:
         ).as_json()
         for scene in SCENES
     }
-    counts = count_network(network, settings.width, settings.height)
+    picture = torch.zeros(1, 3, settings.height, settings.width)
     kept = settings.model_dump(mode="json", exclude={"sources", "cache"})
     kept["network"].pop("encoder_weights")
     return ComparisonResult(
         network=settings.network.name,
-        parameters=counts.parameters,
-        multiply_adds=counts.multiply_adds,
+        parameters=count_parameters(network),
+        multiply_adds=count_multiply_adds(network, picture),
         settings=kept,
         images=state.images,
         trained_minutes=round(state.trained_s / 60, 1),

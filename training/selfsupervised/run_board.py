@@ -27,7 +27,7 @@ class RunBoard:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._writer = SummaryWriter(str(folder))  # type: ignore[no-untyped-call]
+        self._writer = SummaryWriter(str(folder))
 
     def __enter__(self) -> RunBoard:
         return self
@@ -35,7 +35,7 @@ class RunBoard:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._writer.close()  # type: ignore[no-untyped-call]
+        self._writer.close()
 
     def add(self, report: SelfSupervisedStep) -> None:
         """Take in a step; most steps write nothing."""
@@ -54,7 +54,7 @@ class RunBoard:
             self._pictures(report)
 
     def _scalar(self, name: str, value: float, images: int) -> None:
-        self._writer.add_scalar(name, value, images)  # type: ignore[no-untyped-call]
+        self._writer.add_scalar(name, value, images)
 
     def _pictures(self, report: SelfSupervisedStep) -> None:
         disparity = shown(report.prediction.disparities[0][:_PICTURES].detach())
@@ -64,7 +64,7 @@ class RunBoard:
             "frame/auto_mask": report.terms.auto_mask[:_PICTURES].float(),
         }
         for name, pictures in rows.items():
-            self._writer.add_images(name, pictures.cpu(), report.images)  # type: ignore[no-untyped-call]
+            self._writer.add_images(name, pictures.cpu(), report.images)
 
 
 def shown(disparity: Tensor) -> Tensor:
