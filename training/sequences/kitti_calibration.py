@@ -12,7 +12,9 @@ from training.errors import TrainingDataError
 from uavdepth.camera import CameraModel
 from uavdepth.errors import CameraModelError
 
-PROJECTION_NUMBERS = 12
+PIXEL_FROM_KITTI = np.array([[1.0, 0.0, -1.0], [0.0, 1.0, -1.0], [0.0, 0.0, 1.0]])
+"""KITTI's calibration counts pixels from 1 (its MATLAB development kit draws and reads them so, and every
+published evaluation against its LiDAR takes the 1 off); here the centre of the first pixel is 0."""
 
 
 def read_matrices(path: Path) -> dict[str, NDArray[np.float64]]:
@@ -60,16 +62,18 @@ def matrix(
     return values.reshape(rows, columns)
 
 
-def camera_from_projection(
-    path: Path, projection: NDArray[np.float64], width: int, height: int
-) -> CameraModel:
-    """Intrinsics of a rectified camera from its (3, 4) projection P.
+def projection(path: Path, matrices: Mapping[str, NDArray[np.float64]], name: str) -> NDArray[np.float64]:
+    """(3, 4) projection onto pixels counted from 0. Raises TrainingDataError: as `matrix`."""
+    return np.asarray(PIXEL_FROM_KITTI @ matrix(path, matrices, name, 3, 4))
+
+
+def camera_from_projection(path: Path, p: NDArray[np.float64], width: int, height: int) -> CameraModel:
+    """Intrinsics of a rectified camera from its (3, 4) `projection`.
 
     Raises:
-        TrainingDataError: P is no camera's.
+        TrainingDataError: it is no camera's.
     """
     try:
-        fx, fy = float(projection[0, 0]), float(projection[1, 1])
-        return CameraModel(width, height, fx, fy, float(projection[0, 2]), float(projection[1, 2]))
+        return CameraModel(width, height, float(p[0, 0]), float(p[1, 1]), float(p[0, 2]), float(p[1, 2]))
     except CameraModelError as error:
         raise TrainingDataError(f"{path}: {error}") from error

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from training.errors import TrainingDataError
 from training.sequences.errors import BrokenFrameError
 from training.sequences.frame_sequence import file_problem
-from training.sequences.kitti_calibration import camera_from_projection, matrix, read_matrices
+from training.sequences.kitti_calibration import camera_from_projection, matrix, projection, read_matrices
 from training.sequences.numbered_files import numbered_files, without_gaps
 from training.sequences.pictures import read_calibrated_picture, read_picture
 from training.sequences.pose_file import read_rows
@@ -117,19 +117,19 @@ def _open_sequence(folder: Path) -> KittiOdometrySequence | None:
     pictures = without_gaps(files)
     calibration = folder / "calib.txt"
     matrices = read_matrices(calibration)
-    projection = matrix(calibration, matrices, f"P{present[0][-1]}", 3, 4)
+    image_from_left = projection(calibration, matrices, f"P{present[0][-1]}")
     # calib.txt says no size: the pictures themselves do.
     height, width = _first_size(pictures)
     lidar = None
     if "Tr" in matrices:
         camera_from_lidar = np.eye(4)
         camera_from_lidar[:3] = matrix(calibration, matrices, "Tr", 3, 4)
-        lidar = np.asarray(projection @ camera_from_lidar)
+        lidar = np.asarray(image_from_left @ camera_from_lidar)
     left_from_camera = np.eye(4)
-    left_from_camera[:3, 3] = -np.linalg.solve(projection[:, :3], projection[:, 3])
+    left_from_camera[:3, 3] = -np.linalg.solve(image_from_left[:, :3], image_from_left[:, 3])
     return KittiOdometrySequence(
         f"{folder.name}/{present[0]}",
-        camera_from_projection(calibration, projection, width, height),
+        camera_from_projection(calibration, image_from_left, width, height),
         pictures,
         min(files),
         lidar,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from training.errors import TrainingDataError
 from training.sequences.frame_sequence import file_problem
-from training.sequences.kitti_calibration import camera_from_projection, matrix, read_matrices
+from training.sequences.kitti_calibration import camera_from_projection, matrix, projection, read_matrices
 from training.sequences.numbered_files import numbered_files, without_gaps
 from training.sequences.oxts import Oxts, read_oxts
 from training.sequences.pictures import read_calibrated_picture, require_first_picture
@@ -107,9 +107,9 @@ def _open_drive(root: Path, folder: Path) -> KittiDrive | None:
     date = folder.parent.parent
     calibration = date / "calib_cam_to_cam.txt"
     matrices = read_matrices(calibration)
-    projection = matrix(calibration, matrices, f"P_rect_{number}", 3, 4)
+    image_from_rectified = projection(calibration, matrices, f"P_rect_{number}")
     width, height = (int(each) for each in matrix(calibration, matrices, f"S_rect_{number}", 1, 2)[0])
-    camera = camera_from_projection(calibration, projection, width, height)
+    camera = camera_from_projection(calibration, image_from_rectified, width, height)
     pictures = without_gaps(files)
     require_first_picture(pictures[0], camera)
     return KittiDrive(
@@ -117,12 +117,12 @@ def _open_drive(root: Path, folder: Path) -> KittiDrive | None:
         camera,
         pictures,
         min(files),
-        _image_from_lidar(date, projection, matrix(calibration, matrices, "R_rect_00", 3, 3)),
+        _image_from_lidar(date, image_from_rectified, matrix(calibration, matrices, "R_rect_00", 3, 3)),
     )
 
 
 def _image_from_lidar(
-    date: Path, projection: NDArray[np.float64], rectification: NDArray[np.float64]
+    date: Path, image_from_rectified: NDArray[np.float64], rectification: NDArray[np.float64]
 ) -> NDArray[np.float64] | None:
     """(3, 4) P_rect R_rect_00 T_velo_to_cam (Geiger et al. 2013, eq. 8)."""
     path = date / "calib_velo_to_cam.txt"
@@ -133,4 +133,4 @@ def _image_from_lidar(
     camera_from_lidar[:3, :3] = matrix(path, matrices, "R", 3, 3)
     camera_from_lidar[:3, 3] = matrix(path, matrices, "T", 1, 3)[0]
     rectified_from_camera[:3, :3] = rectification
-    return np.asarray(projection @ rectified_from_camera @ camera_from_lidar)
+    return np.asarray(image_from_rectified @ rectified_from_camera @ camera_from_lidar)
