@@ -8,8 +8,11 @@ text; these choices are ours, and alike in all four variants where they do not t
   training a normalised decoder learns faster, and for inference it folds into the convolutions.
 - Borders are replicated, and the decoder repeats pixels when it up-samples, as Monodepth2's does.
 - Attention sits behind the convolution that fuses a stage's maps, in all five stages.
-- Aggregation nodes: two columns with 32, 32, 64 and one with 128 channels, as `aggregation.py` builds them.
-  64 channels at half resolution would cost as much as the whole decoder.
+- Aggregation nodes, as `aggregation.py` builds them: two with 16 channels at 1/2, two with 32 at 1/4, two
+  with 64 at 1/8, one with 128 at 1/16. The encoder's 64 channels at 1/2 would cost 2.7 G multiply-adds more
+  at 640x192.
+
+15.1 M parameters; 9.2 G multiply-adds at 640x192, 1.15 times Monodepth2's.
 """
 
 from __future__ import annotations
@@ -30,7 +33,7 @@ from training.networks.squeeze_excitation import SqueezeExcitation
 DECODER_CHANNELS = (16, 32, 64, 128, 256)
 """Widths of the decoder at 1, 1/2, 1/4, 1/8 and 1/16 of the picture."""
 
-NODE_CHANNELS = (32, 32, 64, 128, 128)
+NODE_CHANNELS = (16, 32, 64, 128, 128)
 """Widths of the aggregation grid at 1/2, 1/4, 1/8, 1/16 and 1/32; the last has no node and only feeds."""
 
 NODE_COLUMNS = (2, 2, 2, 1, 0)
