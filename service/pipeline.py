@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import structlog
@@ -12,16 +13,21 @@ from numpy.typing import NDArray
 
 from service.errors import ConfigError
 from service.frame import Frame
+from service.ground_hints import GroundHints, KnownGround, hints_of
+from service.scale_from_ground import ScaleFromGround, ScaleSource
+from service.scale_status import ScaleStatus
 from service.settings import Settings
 from service.telemetry import Telemetry
 from service.trouble import Trouble
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel
 from uavdepth.depth_map import DepthMap
-from uavdepth.errors import ModelCardError, ModelFileError, UavDepthError
-from uavdepth.ground_scale import GroundScale
+from uavdepth.errors import ModelCardError, ModelFileError, ProviderFallbackWarning, UavDepthError
+from uavdepth.hints import Hints
 from uavdepth.obstacle_scan import SECTOR_COUNT, ObstacleScan, SectorState, sector_bearings_deg
-from uavdepth.scale_tracker import ScaleTracker
+
+if TYPE_CHECKING:
+    from uavdepth.depth_model import DepthModel
 
 log = structlog.get_logger()
 
@@ -31,19 +37,12 @@ a valley floor or a roof (over a valley factors near 0.25 came out, each with a 
 
 
 class DepthSource(Protocol):
-    """What tells depth from a picture, up to one factor."""
+    """What tells depth from a picture, up to one factor, or in metres where it is given hints."""
 
-    def infer(self, image_bgr: NDArray[np.uint8], camera: CameraModel) -> DepthMap:
+    def infer(
+        self, image_bgr: NDArray[np.uint8], camera: CameraModel, hints: Hints | None = None
+    ) -> DepthMap:
         """Depth at the camera's pixels."""
-
-
-class ScaleSource(Protocol):
-    """What tells the factor to metres from the ground."""
-
-    def estimate(
-        self, depth_m: NDArray[np.float32], attitude: Attitude, height_m: float
-    ) -> GroundScale | None:
-        """The factor, or None where not enough ground is seen."""
 
 
 class Scanner(Protocol):
@@ -53,21 +52,6 @@ class Scanner(Protocol):
         self, depth_m: NDArray[np.float32], attitude: Attitude, height_m: float | None = None
     ) -> ObstacleScan:
         """The scan."""
-
-
-@dataclass(frozen=True)
-class ScaleStatus:
-    """The metric scale that a picture was measured with.
-
-    Args:
-        factor: network units to metres.
-        relative_sigma: its relative standard deviation.
-        age_s: time since the ground was seen, seconds; 0 if on this picture.
-    """
-
-    factor: float
-    relative_sigma: float
-    age_s: float
 
 
 @dataclass(frozen=True)
@@ -120,12 +104,12 @@ def unknown_scan(min_distance_m: float, max_distance_m: float) -> ObstacleScan:
 
 
 class Perception:
-    """The chain of steps. One thread; what it remembers from frame to frame is the scale alone.
+    """The chain of steps. One thread; what it remembers from frame to frame is the scale or the height alone.
 
     Args:
         settings: the configuration.
         model: tells depth up to a factor.
-        scaler: tells the factor.
+        scaler: tells the factor; None for a model that takes the ground as a hint and answers in metres.
         scanner: tells obstacles.
         model_max_depth_m: where the network's depth ends; its value there means "there or beyond".
     """
@@ -134,19 +118,19 @@ class Perception:
         self,
         settings: Settings,
         model: DepthSource,
-        scaler: ScaleSource,
+        scaler: ScaleSource | None,
         scanner: Scanner,
         model_max_depth_m: float = float("inf"),
     ) -> None:
-        self._camera = settings.camera.model
-        self._scan_settings = settings.scan
+        scan, camera = settings.scan, settings.camera.model
+        self._camera = camera
+        self._scan_settings = scan
         self._max_relative_sigma = settings.model.max_relative_sigma
         self._model = model
-        self._scaler = scaler
+        self._scale = None if scaler is None else ScaleFromGround(scaler, scan)
+        self._hints = GroundHints(camera, settings.mount.mount, scan.scale_hold_without_height_s)
         self._scanner = scanner
         self._model_max_depth_m = model_max_depth_m
-        self._tracker = ScaleTracker(settings.scan.scale_hold_s)
-        self._ground_seen_ns = 0
         self._model_failures = 0
 
     @classmethod
@@ -154,17 +138,14 @@ class Perception:
         """The chain with the configured network.
 
         Raises:
-            ConfigError: a network that is missing, has no card or cannot be run.
+            ConfigError: a network that is missing, has no card, cannot be run, or tells inverse depth up
+                to scale and shift only.
         """
-        from uavdepth.depth_model import DepthModel
         from uavdepth.ground_scale import GroundScaler
         from uavdepth.scanner import ObstacleScanner
 
         camera, mount, scan = settings.camera.model, settings.mount.mount, settings.scan
-        try:
-            model = DepthModel.load(settings.model.path, settings.model.provider, settings.model.threads)
-        except (ModelFileError, ModelCardError) as error:
-            raise ConfigError(f"[model] path: {error}") from error
+        model = _load_model(settings)
         scanner = ObstacleScanner(
             camera,
             mount,
@@ -174,7 +155,8 @@ class Perception:
             above_m=scan.above_m,
         )
         scaler = GroundScaler(camera, mount, METRIC_FACTORS if model.card.metric else None)
-        return cls(settings, model, scaler, scanner, model.card.max_depth_m)
+        max_depth_m = float("inf") if model.card.max_depth_m is None else model.card.max_depth_m
+        return cls(settings, model, None if "ground" in model.card.hints else scaler, scanner, max_depth_m)
 
     @property
     def model_failures(self) -> int:
@@ -191,10 +173,11 @@ class Perception:
         return self.step_late(frame, lambda _captured_ns: telemetry)
 
     def step_late(self, frame: Frame, telemetry_at: Callable[[int], Telemetry]) -> PerceptionResult:
-        """`step`, which asks for the vehicle's state only after the network has run.
+        """`step`, which asks for the vehicle's state at capture again after the network has run.
 
         Live, the messages from both sides of the capture have arrived by then, so that attitude is
-        interpolated instead of carried forward.
+        interpolated instead of carried forward. A network that takes hints is told the state as it is
+        known before, and its answer is used only if that proves to have been right.
 
         Args:
             frame: the picture, of the calibrated size.
@@ -203,9 +186,14 @@ class Perception:
         unknown = unknown_scan(self._scan_settings.min_distance_m, self._scan_settings.max_distance_m)
         blank = PerceptionResult(frame, Telemetry(frame.captured_ns), None, None, unknown)
         try:
-            raw = self._model.infer(frame.image_bgr, self._camera)
+            ground = None
+            if self._scale is None:
+                ground = self._hints.before(frame.captured_ns, telemetry_at)
+                raw = self._model.infer(frame.image_bgr, self._camera, hints_of(ground))
+            else:
+                raw = self._model.infer(frame.image_bgr, self._camera)
             blank = replace(blank, telemetry=telemetry_at(frame.captured_ns))
-            return self._measure(blank, raw)
+            return self._measure(blank, raw, ground)
         except UavDepthError as error:
             self._model_failures += 1
             return replace(blank, trouble=Trouble.MODEL_FAILED, detail=str(error))
@@ -216,21 +204,27 @@ class Perception:
             detail = f"{type(error).__name__}: {error}"
             return replace(blank, trouble=Trouble.MODEL_FAILED, detail=detail)
 
-    def _measure(self, blank: PerceptionResult, raw: DepthMap) -> PerceptionResult:
+    def _measure(
+        self, blank: PerceptionResult, raw: DepthMap, ground: KnownGround | Trouble | None
+    ) -> PerceptionResult:
         if not np.isfinite(raw.depth_m).any():
             return replace(blank, trouble=Trouble.NO_DEPTH)
         telemetry = blank.telemetry
         if telemetry.attitude is None:
             return replace(blank, trouble=Trouble.NO_ATTITUDE)
         seen = self._certain(raw)
-        estimate = None
-        if telemetry.height_m is not None:
-            estimate = self._scaler.estimate(seen, telemetry.attitude, telemetry.height_m)
-        scale = self._tracked(estimate, blank.captured_ns, has_height=telemetry.height_m is not None)
-        if scale is None:
-            missing = Trouble.NO_HEIGHT if telemetry.height_m is None else Trouble.NO_GROUND
-            return replace(blank, trouble=missing)
-        if scale.relative_sigma > self._scan_settings.max_scale_sigma:
+        scale: ScaleStatus | Trouble
+        if self._scale is not None:
+            scale = self._scale.of(seen, telemetry.attitude, telemetry, blank.captured_ns)
+        elif isinstance(ground, KnownGround):
+            scale = self._hints.after(ground, raw, telemetry.attitude)
+        else:
+            scale = ground or Trouble.NO_HEIGHT
+        if isinstance(scale, Trouble):
+            return replace(blank, trouble=scale)
+        # A network in metres says by the pixel what it doubts; before a wall without ground in view doubt of
+        # the whole picture would be silence, and ArduPilot takes that for a free path.
+        if self._scale is not None and scale.relative_sigma > self._scan_settings.max_scale_sigma:
             return replace(blank, scale=scale, trouble=Trouble.BAD_SCALE)
         depth_m = self._in_metres(seen, scale.factor)
         depth = DepthMap(depth_m, raw.relative_sigma)
@@ -240,24 +234,6 @@ class Perception:
             # ArduPilot reads "unknown everywhere" as healthy and free (measured): silence is the only no.
             return result.distrusted(Trouble.NO_DEPTH)
         return result
-
-    def _tracked(
-        self, estimate: GroundScale | None, captured_ns: int, *, has_height: bool
-    ) -> ScaleStatus | None:
-        """The scale to use for this picture, its ground's or one that is held.
-
-        A vehicle that stopped before a wall sees no ground, and silence would open ArduPilot's path into
-        the wall after 1 to 1.75 s (measured): so a scale is held long there, with a sigma that grows.
-        """
-        if estimate is not None:
-            self._ground_seen_ns = captured_ns
-        scale = self._tracker.update(estimate, captured_ns)
-        if scale is None:
-            return None
-        age_s = (captured_ns - self._ground_seen_ns) / 1e9
-        if not has_height and age_s > self._scan_settings.scale_hold_without_height_s:
-            return None
-        return ScaleStatus(scale.factor, scale.relative_sigma, age_s)
 
     def _certain(self, depth: DepthMap) -> NDArray[np.float32]:
         """Depth with the pixels that the network is not sure of taken out."""
@@ -277,3 +253,25 @@ class Perception:
         if self._model_max_depth_m * factor <= self._scan_settings.max_distance_m:
             metres[depth >= self._model_max_depth_m] = np.nan
         return metres
+
+
+def _load_model(settings: Settings) -> DepthModel:
+    from uavdepth.depth_model import DepthModel
+
+    wanted = settings.model
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ProviderFallbackWarning)
+            model = DepthModel.load(wanted.path, wanted.provider, wanted.threads, wanted.card)
+    except (ModelFileError, ModelCardError) as error:
+        raise ConfigError(f"[model] path: {error}") from error
+    if model.card.output == "affine_inverse_depth":
+        raise ConfigError(
+            f"[model] path: {model.card.name} tells inverse depth up to an unknown scale and shift "
+            "(output 'affine_inverse_depth'), and this version has no estimator for both: take a network "
+            "with depth in metres or up to one factor"
+        )
+    log.info("network", name=model.card.name, provider=model.provider, precision=model.precision)
+    if model.fallback_reason is not None:
+        log.warning("network runs on a slower provider", provider=model.provider, why=model.fallback_reason)
+    return model

@@ -8,8 +8,8 @@ from pathlib import Path
 from service.autopilot.link_status import LinkStatus
 from service.autopilot.service_state import ServiceState
 from service.cameras.reader import CameraStatus
-from service.pipeline import ScaleStatus
 from service.publisher.publisher import PublisherStatus
+from service.scale_status import ScaleStatus
 from service.trouble import Trouble
 
 _MIB = 1024 * 1024
@@ -57,7 +57,7 @@ class ServiceStatus:
         latency: from capture to wire; None before the first message.
         drops: what was skipped.
         model_failures: pictures that the network failed on.
-        scale: metric scale from the ground; None before the first.
+        scale: metric scale of the newest picture; None if it has none.
         height_m, mode, armed: the vehicle's; None if not heard.
         camera: the camera.
         link: the MAVLink link.

@@ -76,7 +76,7 @@ def open_session(path: Path, provider: str, threads: int | None) -> InferenceSes
 
 
 def _open(name: str, path: Path, threads: int | None) -> InferenceSession:
-    """The session; every failure of ONNX Runtime becomes `ProviderUnavailableError`, by the provider's name."""
+    """The session; a failure of ONNX Runtime becomes `ProviderUnavailableError`, with the provider's name."""
     provider = PROVIDERS[name]
     try:
         opened = provider.open(path, threads)

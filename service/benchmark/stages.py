@@ -79,8 +79,16 @@ def measure_stages(model_name: str, pictures: list[NDArray[np.uint8]]) -> StageT
     model = DepthModel(InferenceSession(watch, session.provider), loaded.card, loaded.source)
     factors = METRIC_FACTORS if loaded.card.metric else None
     scaler, scanner = GroundScaler(CAMERA, MOUNT, factors), ObstacleScanner(CAMERA, MOUNT)
-    settings = Settings.model_validate({"camera": {"source": "sim:city", "width": 640, "height": 320}})
-    perception = Perception(settings, model, scaler, scanner, loaded.card.max_depth_m)
+    settings = Settings.model_validate(
+        {
+            "camera": {"source": "sim:city", "width": CAMERA.width, "height": CAMERA.height},
+            "mount": {"pitch_deg": MOUNT.pitch_deg},
+        }
+    )
+    max_depth_m = float("inf") if loaded.card.max_depth_m is None else loaded.card.max_depth_m
+    perception = Perception(
+        settings, model, None if "ground" in loaded.card.hints else scaler, scanner, max_depth_m
+    )
     rows = []
     for number, picture in enumerate(pictures):
         frame = Frame(picture, number, number)

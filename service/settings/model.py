@@ -16,13 +16,20 @@ class ModelSettings(Section):
         default="default",
         min_length=1,
         title="Network",
-        description="`default` for the weights inside the package, or the path of an ONNX file "
-        "with a model card.",
+        description="`default` or another name of weights inside the package, or the path of an ONNX file "
+        "with a model card in it or beside it (`FILE.onnx.toml`).",
     )
-    provider: Literal["auto", "cpu", "openvino"] = Field(
+    card: str | None = Field(
+        default=None,
+        min_length=1,
+        title="Model card",
+        description="TOML file with the card of a foreign network, used whatever the network's file says.",
+    )
+    provider: Literal["auto", "tensorrt", "cuda", "openvino", "cpu"] = Field(
         default="auto",
         title="ONNX Runtime provider",
-        description="What computes the network; `auto` takes the best one that is installed.",
+        description="What computes the network; `auto` takes the first of the others that is installed and "
+        "works.",
     )
     threads: int | None = Field(
         default=None,

@@ -16,9 +16,10 @@ from program_fakes import free_port, make_settings, picture, wait_until, wall_ov
 from service.clock import ManualClock, MonotonicClock
 from service.errors import PublisherError
 from service.frame import Frame
-from service.pipeline import PerceptionResult, ScaleStatus, unknown_scan
+from service.pipeline import PerceptionResult, unknown_scan
 from service.publisher.publisher import ZenohPublisher
 from service.publisher.session import open_session
+from service.scale_status import ScaleStatus
 from service.publisher.wire import CameraHeader, DepthHeader, ScanSample, StatusSample
 from service.settings import Settings
 from service.telemetry import Telemetry
