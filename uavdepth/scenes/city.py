@@ -1,14 +1,15 @@
-"""`city`: streets between blocks of houses, with trees, lamps, signs and parked cars."""
+"""`city`: streets between blocks of houses, with trees, lamps, signs, parked cars, traffic and people."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from uavdepth.scenes.buildings import add_house
 from uavdepth.scenes.cars import CarPark
+from uavdepth.scenes.city_life import CityPlan, House, add_city_life
 from uavdepth.scenes.copies import Template, add_copies
 from uavdepth.scenes.description import SceneDescription
 from uavdepth.scenes.mesh import MeshBuilder
@@ -22,6 +23,7 @@ from uavdepth.scenes.street_grid import (
     draw_blocks,
     draw_street,
     ground_height,
+    off_corridor,
     parallel_streets,
 )
 from uavdepth.scenes.textures_facade import FACADE_CELL_M
@@ -30,8 +32,6 @@ from uavdepth.scenes.vegetation import TreeKind, add_tree
 from uavdepth.scenes.weather import draw_weather
 
 _HORIZON_M = 900.0
-_CORRIDOR_M = 3.4
-"""Nothing but the ground stands nearer than this to the straight line north of the origin."""
 
 _TREES: tuple[tuple[TreeKind, ...], ...] = (
     ("broadleaf", "birch"),
@@ -54,6 +54,7 @@ class _Town:
     """Chance that a place for a car has one."""
     floors: tuple[int, int]
     facade_north_m: float
+    houses: list[House] = field(default_factory=list)
 
 
 def build(seed: int) -> SceneDescription:
@@ -85,19 +86,9 @@ def build(seed: int) -> SceneDescription:
         _add_block(town, block)
     _add_roads(town, easts, norths, facade_m)
     town.cars.build(builder)
+    add_city_life(builder, seed, CityPlan(easts, norths, blocks, town.houses, facade_m))
     weather = draw_weather(rng, (0.0006, 0.008))
-    return SceneDescription(
-        mesh=builder.build(),
-        ground_height_m=ground_height(blocks),
-        sun_direction_ned=weather.sun_direction_ned,
-        sun_bgr=weather.sun_bgr,
-        ambient_bgr=weather.ambient_bgr,
-        sky_top_bgr=weather.sky_top_bgr,
-        sky_horizon_bgr=weather.sky_horizon_bgr,
-        haze_per_m=weather.haze_per_m,
-        cloud_amount=weather.cloud_amount,
-        extent_m=REACH_M - 15.0,
-    )
+    return weather.over(builder.build(), ground_height(blocks), REACH_M - 15.0)
 
 
 def _add_ground(town: _Town) -> None:
@@ -136,7 +127,9 @@ def _add_block(town: _Town, block: Rect) -> None:
             _add_garden(town, plot)
             continue
         floors = int(rng.integers(town.floors[0], town.floors[1] + 1))
-        add_house(builder, rng, plot, max(floors, 4) if faces_origin else floors, KERB_M)
+        floors = max(floors, 4) if faces_origin else floors
+        add_house(builder, rng, plot, floors, KERB_M)
+        town.houses.append(House(plot, block, floors))
     _furnish(town, pavement)
 
 
@@ -217,7 +210,7 @@ def _furnish(town: _Town, pavement: Rect) -> None:
     for axis, line_m, low_m, high_m, outwards in edges:
         for number, along_m in enumerate(np.arange(low_m + 3.0, high_m - 2.0, 5.5)):
             place = (line_m, float(along_m)) if axis == 0 else (float(along_m), line_m)
-            if abs(place[0]) > REACH_M or abs(place[1]) > REACH_M or not _off_corridor(place, 1.2):
+            if abs(place[0]) > REACH_M or abs(place[1]) > REACH_M or not off_corridor(*place, 1.2):
                 continue
             if number % 4 == 0:
                 add_lamp(town.builder, rng, *place, KERB_M, outwards)
@@ -237,15 +230,9 @@ def _furnish(town: _Town, pavement: Rect) -> None:
         here = which == number
         reach = template.reach * heights
         here &= np.array(
-            [_off_corridor((foot[0], foot[1]), r) for foot, r in zip(feet, reach, strict=True)], bool
+            [off_corridor(foot[0], foot[1], r) for foot, r in zip(feet, reach, strict=True)], bool
         )
         add_copies(town.builder, rng, template, feet[here], heights[here])
-
-
-def _off_corridor(place: tuple[float, float], reach_m: float) -> bool:
-    """Whether a thing stands clear of the line that the vehicle takes north from the origin."""
-    north, east = place
-    return not (-6.0 < north < 46.0 and abs(east) < _CORRIDOR_M + reach_m)
 
 
 def _add_roads(town: _Town, easts: list[Street], norths: list[Street], facade_m: float) -> None:
@@ -279,7 +266,7 @@ def _mark_and_park(town: _Town, axis: int, street: Street, along_m: float) -> No
         if rng.random() > town.parked:
             continue
         spot = place(side * (street.half_road_m - 1.05), rng.uniform(-0.5, 0.5))
-        if not _off_corridor(spot, 1.0) or (abs(spot[1]) < 9.0 and abs(spot[0] - town.facade_north_m) < 14.0):
+        if not off_corridor(*spot, 1.0) or (abs(spot[1]) < 9.0 and abs(spot[0] - town.facade_north_m) < 14.0):
             continue
         heading = (0.0 if axis == 1 else np.pi / 2) + (np.pi if rng.random() < 0.5 else 0.0)
         town.cars.park(*spot, 0.0, heading + rng.normal(0.0, 0.02))

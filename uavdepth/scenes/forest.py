@@ -92,18 +92,7 @@ def build(seed: int) -> SceneDescription:
     _add_undergrowth(builder, rng, wood, wall_north_m)
     _add_far_trees(builder, rng, wood)
     weather = draw_weather(rng, (0.001, 0.009))
-    return SceneDescription(
-        mesh=builder.build(),
-        ground_height_m=_flat,
-        sun_direction_ned=weather.sun_direction_ned,
-        sun_bgr=weather.sun_bgr,
-        ambient_bgr=weather.ambient_bgr,
-        sky_top_bgr=weather.sky_top_bgr,
-        sky_horizon_bgr=weather.sky_horizon_bgr,
-        haze_per_m=weather.haze_per_m,
-        cloud_amount=weather.cloud_amount,
-        extent_m=_EXTENT_M,
-    )
+    return weather.over(builder.build(), _flat, _EXTENT_M)
 
 
 def _flat(north_m: ArrayLike, east_m: ArrayLike) -> Values:

@@ -41,11 +41,10 @@ class MeshBuilder:
     _vertices: list[NDArray[np.float32]] = field(default_factory=list)
     _faces: list[NDArray[np.int32]] = field(default_factory=list)
     _uv: list[NDArray[np.float32]] = field(default_factory=list)
-    _texture: list[NDArray[np.int32]] = field(default_factory=list)
     _tint: list[NDArray[np.float32]] = field(default_factory=list)
-    _smooth: list[NDArray[np.bool_]] = field(default_factory=list)
-    _names: list[str] = field(default_factory=list)
-    _vertex_count: int = 0
+    _kind: list[tuple[int, int, int, bool]] = field(default_factory=list)
+    """Vertices, faces, texture's number and smoothness of each part."""
+    _numbers: dict[str, int] = field(default_factory=dict)
 
     def add(
         self,
@@ -71,33 +70,40 @@ class MeshBuilder:
         """
         vertices = np.asarray(vertices_m, np.float32).reshape(-1, 3)
         triangles = np.asarray(faces, np.int32).reshape(-1, 3)
-        if triangles.size and (triangles.min() < 0 or triangles.max() >= len(vertices)):
-            raise SceneError(f"a face names vertex {triangles.max()} of {len(vertices)}")
+        # As unsigned numbers, negative ones are large: one pass finds both kinds of mistake.
+        if triangles.size and triangles.view(np.uint32).max() >= len(vertices):
+            raise SceneError(f"faces name vertices {triangles.min()} to {triangles.max()} of {len(vertices)}")
         uv = np.asarray(uv_m, np.float32)
         corners = uv[triangles] if uv.ndim == 2 else uv
         if corners.shape != (len(triangles), 3, 2):
             raise SceneError(f"texture coordinates have shape {uv.shape}, not (N, 2) or (M, 3, 2)")
-        if texture not in self._names:
-            self._names.append(texture)
-        count = len(triangles)
+        if texture not in self._numbers:
+            self._numbers[texture] = len(self._numbers)
         self._vertices.append(vertices)
-        self._faces.append(triangles + np.int32(self._vertex_count))
+        self._faces.append(triangles)
         self._uv.append(corners)
-        self._texture.append(np.full(count, self._names.index(texture), np.int32))
-        self._tint.append(np.ascontiguousarray(np.broadcast_to(np.asarray(tint, np.float32), (count, 3))))
-        self._smooth.append(np.full(count, smooth))
-        self._vertex_count += len(vertices)
+        self._tint.append(np.asarray(tint, np.float32))
+        self._kind.append((len(vertices), len(triangles), self._numbers[texture], smooth))
 
     def build(self) -> Mesh:
         """Everything added so far as one mesh. Raises SceneError when nothing was added."""
         if not self._faces:
             raise SceneError("the scene has no triangles")
+        vertex_count, face_count, texture, smooth = np.array(self._kind).T
+        faces = np.concatenate(self._faces)
+        first = np.cumsum(vertex_count) - vertex_count
+        faces += np.repeat(first, face_count).astype(np.int32)[:, None]
+        tint = np.empty((len(faces), 3), np.float32)
+        end = 0
+        for count, color in zip(face_count, self._tint, strict=True):
+            tint[end : end + count] = color
+            end += count
         return Mesh(
             np.concatenate(self._vertices),
-            np.concatenate(self._faces),
+            faces,
             np.concatenate(self._uv),
-            np.concatenate(self._texture),
-            np.concatenate(self._tint),
-            np.concatenate(self._smooth),
-            tuple(self._names),
+            np.repeat(texture, face_count).astype(np.int32),
+            tint,
+            np.repeat(smooth, face_count).astype(bool),
+            tuple(self._numbers),
         )

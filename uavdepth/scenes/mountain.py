@@ -127,18 +127,7 @@ def build(seed: int) -> SceneDescription:
     _add_boulders(builder, rng, grid, valley)
     _add_plants(builder, rng, grid, valley, snow_line_m)
     weather = draw_weather(rng, (0.0006, 0.004))
-    return SceneDescription(
-        mesh=builder.build(),
-        ground_height_m=ground,
-        sun_direction_ned=weather.sun_direction_ned,
-        sun_bgr=weather.sun_bgr,
-        ambient_bgr=weather.ambient_bgr,
-        sky_top_bgr=weather.sky_top_bgr,
-        sky_horizon_bgr=weather.sky_horizon_bgr,
-        haze_per_m=weather.haze_per_m,
-        cloud_amount=weather.cloud_amount,
-        extent_m=_EXTENT_M,
-    )
+    return weather.over(builder.build(), ground, _EXTENT_M)
 
 
 def _eased(distance: Values) -> Values:

@@ -15,6 +15,9 @@ PAVEMENT_M = 4.0
 REACH_M = 130.0
 """How far from the origin streets are laid; houses go on for another block."""
 
+CORRIDOR_M = 3.4
+"""Nothing but the ground stands nearer than this to the straight line north of the origin."""
+
 
 @dataclass(frozen=True)
 class Street:
@@ -64,6 +67,11 @@ def draw_blocks(easts: list[Street], norths: list[Street], facade_m: float) -> l
             low = facade_m if behind else north_low
             blocks.append(Rect(low, north_high, east_low, east_high))
     return blocks
+
+
+def off_corridor(north_m: float, east_m: float, reach_m: float) -> bool:
+    """Whether a thing stands clear of the line that the vehicle takes north from the origin."""
+    return not (-6.0 < north_m < 46.0 and abs(east_m) < CORRIDOR_M + reach_m)
 
 
 def ground_height(blocks: list[Rect]) -> GroundHeight:

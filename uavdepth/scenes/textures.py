@@ -11,8 +11,9 @@ from uavdepth.errors import SceneError
 from uavdepth.scenes.description import TextureSource
 from uavdepth.scenes.textures_city import CITY_TEXTURES
 from uavdepth.scenes.textures_nature import NATURE_TEXTURES
+from uavdepth.scenes.textures_things import THING_TEXTURES
 
-TEXTURES: dict[str, TextureSource] = CITY_TEXTURES | NATURE_TEXTURES
+TEXTURES: dict[str, TextureSource] = CITY_TEXTURES | NATURE_TEXTURES | THING_TEXTURES
 
 VARIANTS = 4
 """Differently painted versions of each texture; a scene's seed picks one. Bounds the cache's memory."""

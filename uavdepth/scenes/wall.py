@@ -44,18 +44,7 @@ def build(seed: int) -> SceneDescription:
             add_box(builder, (north_m - 0.15, float(east_m)), (0.3, 0.6), 0.0, height_m, "concrete", tint)
     _add_things(builder, rng, north_m)
     weather = draw_weather(rng, (0.0005, 0.006))
-    return SceneDescription(
-        mesh=builder.build(),
-        ground_height_m=_flat,
-        sun_direction_ned=weather.sun_direction_ned,
-        sun_bgr=weather.sun_bgr,
-        ambient_bgr=weather.ambient_bgr,
-        sky_top_bgr=weather.sky_top_bgr,
-        sky_horizon_bgr=weather.sky_horizon_bgr,
-        haze_per_m=weather.haze_per_m,
-        cloud_amount=weather.cloud_amount,
-        extent_m=_HALF_M - 15.0,
-    )
+    return weather.over(builder.build(), _flat, _HALF_M - 15.0)
 
 
 def _flat(north_m: ArrayLike, east_m: ArrayLike) -> NDArray[np.float64]:

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uavdepth.scenes.description import Color
+from uavdepth.scenes.description import Color, GroundHeight, SceneDescription
+from uavdepth.scenes.mesh import Mesh
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,10 @@ class Weather:
     sky_horizon_bgr: Color
     haze_per_m: float
     cloud_amount: float
+
+    def over(self, mesh: Mesh, ground_height_m: GroundHeight, extent_m: float) -> SceneDescription:
+        """The world of these parts on this day; arguments as in `SceneDescription`."""
+        return SceneDescription(mesh=mesh, ground_height_m=ground_height_m, extent_m=extent_m, **vars(self))
 
 
 def draw_weather(rng: np.random.Generator, haze_per_m: tuple[float, float]) -> Weather:
