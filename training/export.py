@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
+from itertools import product
 from pathlib import Path
 from typing import Any, cast
 
@@ -18,7 +19,8 @@ from pydantic import JsonValue
 from torch import Tensor, nn
 
 from training.checkpoint import Checkpoint
-from training.errors import CheckpointError, ExportError
+from training.errors import ExportError
+from training.half_weights import rounded_network, store_in_half
 from training.networks.depth_network import DepthNetwork
 from training.normalization import FOCAL_REFERENCE_PX, IMAGE_MEAN, IMAGE_STD, MAX_DEPTH_M
 from uavdepth.depth_model import DepthModel
@@ -32,6 +34,12 @@ LARGEST_DIFFERENCE = 1e-3
 
 LICENCE = "Apache-2.0"
 
+EXPORT_SIZES = ((384, 192), (640, 320))
+"""Width and height of the files that ship."""
+
+_KNOWN_DEPTH_Q = 0.1
+_KNOWN_EVERY = 37
+
 
 class _TwoOutputs(nn.Module):
     """The network with its outputs as a plain tuple: ONNX knows no dataclasses."""
@@ -40,36 +48,45 @@ class _TwoOutputs(nn.Module):
         super().__init__()
         self.network = network
 
-    def forward(self, image: Tensor) -> tuple[Tensor, Tensor]:
-        output = self.network(image)
+    def forward(self, image: Tensor, ground: Tensor, points: Tensor) -> tuple[Tensor, Tensor]:
+        output = self.network(image, ground, points)
         return output.log_inverse_depth, output.log_sigma
 
 
 def export_checkpoint(
-    checkpoint: Checkpoint, path: Path, name: str, measured: Mapping[str, JsonValue] | None = None
+    checkpoint: Checkpoint,
+    path: Path,
+    name: str,
+    measured: Mapping[str, JsonValue] | None = None,
+    size: tuple[int, int] | None = None,
 ) -> ModelCard:
-    """Write the averaged weights of a run as an ONNX file with its card.
+    """Write the averaged weights of a run, in half precision, as an ONNX file with its card.
 
-    The input has the fixed size of the run's last phase. Normalisation of the picture is not part of the
-    graph, `DepthModel` does it as the card says. The file is read back with `DepthModel` and its output
-    compared with PyTorch's before it takes its place at `path`.
+    Normalisation of the picture is not part of the graph, `DepthModel` does it as the card says. The file
+    is read back with `DepthModel` and its output compared with PyTorch's, with and without hints, before it
+    takes its place at `path`.
 
     Args:
         checkpoint: of the run.
         path: the ONNX file to write; a failure leaves an old one whole.
         name: of the network, for status and records.
         measured: errors on frames it was not trained on, for the card.
+        size: width and height of the input, divisible by 32; None takes those of the run's last phase.
 
     Returns:
         The card that was written.
 
     Raises:
-        ExportError: the written network does not compute what PyTorch does.
+        ExportError: a size that the network cannot take, a weight that half precision cannot hold, or a
+            written network that does not compute what PyTorch does.
         CheckpointError: weights that do not fit the network.
     """
-    card = make_card(checkpoint, name, measured or {})
-    network = _TwoOutputs(_averaged_network(checkpoint)).eval()
+    last = checkpoint.settings.phases[-1]
+    card = make_card(checkpoint, name, measured or {}, size or (last.width, last.height))
+    network = _TwoOutputs(rounded_network(checkpoint.averaged_network())).eval()
     model = _to_onnx(network, card)
+    store_in_half(model)
+    onnx.checker.check_model(model)
     onnx.helper.set_model_props(model, {CARD_METADATA_KEY: card.to_json()})
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f".{path.name}.part.onnx")
@@ -82,14 +99,18 @@ def export_checkpoint(
     return card
 
 
-def make_card(checkpoint: Checkpoint, name: str, measured: Mapping[str, JsonValue]) -> ModelCard:
-    """What the file will say about itself."""
-    size = checkpoint.settings.phases[-1]
+def make_card(
+    checkpoint: Checkpoint, name: str, measured: Mapping[str, JsonValue], size: tuple[int, int]
+) -> ModelCard:
+    """What the file will say about itself. Raises ExportError for a size that the network cannot take."""
+    if any(side % 32 or side < 64 for side in size):
+        raise ExportError(f"the input is {size[0]}x{size[1]}: multiples of 32 from 64 are needed")
     return ModelCard(
-        card_version=1,
+        card_version=2,
         name=name,
-        input_width=size.width,
-        input_height=size.height,
+        input_width=size[0],
+        input_height=size[1],
+        hints=("ground", "points"),
         mean=IMAGE_MEAN,
         std=IMAGE_STD,
         output="log_inverse_depth",
@@ -108,21 +129,13 @@ def make_card(checkpoint: Checkpoint, name: str, measured: Mapping[str, JsonValu
     )
 
 
-def _averaged_network(checkpoint: Checkpoint) -> DepthNetwork:
-    try:
-        return checkpoint.averaged_network()
-    except RuntimeError as error:
-        raise CheckpointError(f"the checkpoint's weights do not fit its network: {error}") from error
-
-
 def _to_onnx(network: _TwoOutputs, card: ModelCard) -> onnx.ModelProto:
-    """The graph, batch normalisations folded into the convolutions before them."""
-    picture = torch.zeros(1, 3, card.input_height, card.input_width)
+    inputs = tuple(torch.zeros(1, channels, card.input_height, card.input_width) for channels in (3, 1, 2))
     with torch.no_grad(), _quiet_exporter():
         program = torch.onnx.export(
             network,
-            (picture,),
-            input_names=[card.input_name],
+            inputs,
+            input_names=[card.input_name, card.ground_name, card.points_name],
             output_names=[card.output_name, card.uncertainty_name],
             opset_version=OPSET,
             dynamo=True,
@@ -130,7 +143,6 @@ def _to_onnx(network: _TwoOutputs, card: ModelCard) -> onnx.ModelProto:
         )
     model = cast(onnx.ModelProto, cast(Any, program).model_proto)
     _strip_traces(model)
-    onnx.checker.check_model(model)
     return model
 
 
@@ -160,16 +172,17 @@ def _strip_traces(model: onnx.ModelProto) -> None:
 
 
 def _check_same_output(network: _TwoOutputs, path: Path) -> None:
-    """Compare ONNX Runtime with PyTorch on a smooth and on a noisy picture."""
+    """Compare ONNX Runtime with PyTorch on a smooth and a noisy picture, with each subset of hints."""
     import onnxruntime
 
     card = DepthModel.load(path, provider="cpu").card
     names = [card.output_name, card.uncertainty_name]
     session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
-    for picture in _pictures(card):
+    inputs = (card.input_name, card.ground_name, card.points_name)
+    for planes in product(_pictures(card), *_hint_maps(card)):
         with torch.no_grad():
-            wanted = network(torch.from_numpy(picture))
-        outputs = session.run(names, {card.input_name: picture})
+            wanted = network(*(torch.from_numpy(plane) for plane in planes))
+        outputs = session.run(names, dict(zip(inputs, planes, strict=True)))
         for name, want, output in zip(
             (card.output_name, card.uncertainty_name), wanted, outputs, strict=True
         ):
@@ -186,3 +199,16 @@ def _pictures(card: ModelCard) -> list[NDArray[np.float32]]:
     noise = np.random.default_rng(0).normal(0.0, 1.0, shape).astype(np.float32)
     slope = np.linspace(-1.0, 1.0, card.input_height, dtype=np.float32)[None, None, :, None]
     return [noise, np.ascontiguousarray(np.broadcast_to(slope, shape))]
+
+
+def _hint_maps(card: ModelCard) -> tuple[list[NDArray[np.float32]], list[NDArray[np.float32]]]:
+    """The ground's and the points' input, each without and with a hint."""
+    size = (card.input_height, card.input_width)
+    ground, points = np.zeros((1, 1, *size), np.float32), np.zeros((1, 2, *size), np.float32)
+    known_ground, known_points = ground.copy(), points.copy()
+    known_ground[..., size[0] // 2 :, :] = np.linspace(0.01, 1.0, size[0] - size[0] // 2)[:, None]
+    known_points[0, 0].flat[::_KNOWN_EVERY] = _KNOWN_DEPTH_Q
+    known_points[0, 1].flat[::_KNOWN_EVERY] = np.linspace(
+        0.1, 1.0, known_points[0, 1].flat[::_KNOWN_EVERY].size
+    )
+    return [ground, known_ground], [points, known_points]
