@@ -29,7 +29,14 @@ def checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Checkpoint:
     settings = TrainingSettings(
         images=4,
         phases=(SizePhase(1.0, 96, 64, 2),),
-        shape=NetworkShape(channels=(4, 4, 4, 4, 4), head_channels=4, frozen_stages=6),
+        large=None,
+        shape=NetworkShape(
+            channels=(4, 4, 4, 4, 4),
+            head_channels=4,
+            frozen_stages=6,
+            hint_channels=(4, 4, 4, 4, 4),
+            correction_channels=4,
+        ),
         precision="fp32",
     )
     trainer = Trainer(settings, FramePool(make_store(tmp_path_factory.mktemp("frames"))), pretrained=False)

@@ -10,22 +10,30 @@ from torch import Tensor
 
 from training.data.batches import Batch
 from training.losses import (
+    FAR_UNCERTAINTY,
+    NEAR_TRUTH_M,
     LossWeights,
     absolute_term,
     depth_loss,
     edge_term,
+    hinted_weights,
     image_median,
     masked_mean,
+    pixel_weights,
     sigma_term,
 )
 from training.networks.depth_network import DepthOutput
+from training.normalization import FOCAL_REFERENCE_PX
 
 
-def batch_of(truth: Tensor, far: Tensor | None = None) -> Batch:
+def batch_of(truth: Tensor, far: Tensor | None = None, focal_px: float = FOCAL_REFERENCE_PX) -> Batch:
     return Batch(
         torch.zeros(len(truth), 3, 1, 1),
         truth,
         torch.zeros_like(truth, dtype=torch.bool) if far is None else far,
+        ground=torch.zeros_like(truth),
+        points=torch.zeros_like(truth).repeat(1, 2, 1, 1),
+        focal_px=torch.full((len(truth),), focal_px),
     )
 
 
@@ -35,7 +43,7 @@ def truth() -> Tensor:
 
 
 def output_of(log_inverse_depth: Tensor) -> DepthOutput:
-    return DepthOutput(log_inverse_depth, torch.zeros_like(log_inverse_depth))
+    return DepthOutput(log_inverse_depth, torch.zeros_like(log_inverse_depth), log_inverse_depth)
 
 
 def test_the_truth_itself_costs_nothing_but_the_sigma(truth: Tensor) -> None:
@@ -69,11 +77,28 @@ def test_sky_may_be_as_far_as_it_likes_but_not_near() -> None:
     assert float(depth_loss(output_of(nearer), batch_of(truth, sky), LossWeights()).absolute) > 0.1
 
 
-def test_sky_counts_less_by_its_weight() -> None:
-    error = torch.ones(1, 1, 1, 2)
-    near = torch.tensor([[[[True, False]]]])
-    error[..., 1] = 3.0
-    assert float(absolute_term(error, near, 0.5)) == pytest.approx((1.0 + 0.5 * 3.0) / 1.5)
+def test_sky_counts_less_and_what_is_near_more() -> None:
+    depth_m = torch.tensor([NEAR_TRUTH_M / 2, NEAR_TRUTH_M * 2, 200.0])
+    sky = torch.tensor([False, False, True])[None, None, None]
+    # Seen with twice the reference's focal length a pixel's inverse depth is twice as large.
+    truth = torch.log(2.0 / depth_m)[None, None, None]
+    batch = batch_of(truth, sky, 2.0 * FOCAL_REFERENCE_PX)
+    assert pixel_weights(batch, LossWeights(near=1.5, far=0.2)).flatten().tolist() == pytest.approx(
+        [1.5, 1.0, 0.2]
+    )
+
+
+def test_metres_count_more_where_a_hint_tells_them(truth: Tensor) -> None:
+    batch = batch_of(truth)
+    batch.points[1, :, 3, 3] = 0.5
+    assert hinted_weights(batch, 2.0).flatten().tolist() == [1.0, 2.0]
+    batch.ground[0, :, 3, 3] = 0.5
+    assert hinted_weights(batch, 2.0).flatten().tolist() == [2.0, 2.0]
+
+
+def test_a_weighted_mean_is_that_of_the_error_without_its_sign() -> None:
+    error, weight = torch.tensor([1.0, -3.0]), torch.tensor([1.0, 0.5])
+    assert float(absolute_term(error, weight)) == pytest.approx((1.0 + 0.5 * 3.0) / 1.5)
 
 
 def test_edges_between_sky_and_the_world_are_left_to_the_other_terms() -> None:
@@ -103,23 +128,38 @@ def test_a_picture_of_sky_alone_has_a_finite_loss_and_gradient() -> None:
     assert bool(torch.isfinite(prediction.grad).all())
 
 
-def test_the_likeliest_sigma_is_that_of_the_error() -> None:
-    spread = 0.2
-    uniform = torch.rand(1, 1, 200, 200, generator=torch.Generator().manual_seed(2)) - 0.5
-    laplace = -spread * uniform.sign() * torch.log1p(-2 * uniform.abs())
-    near = torch.ones_like(laplace, dtype=torch.bool)
-    true_sigma = math.log(math.sqrt(2.0) * spread)
+@pytest.mark.parametrize("kind", ["normal", "laplace", "heavy"])
+def test_the_cheapest_sigma_is_the_quantile_of_the_error_whatever_its_distribution(kind: str) -> None:
+    random = torch.Generator().manual_seed(2)
+    normal = torch.randn(1, 1, 200, 200, generator=random)
+    spread = torch.rand(1, 1, 200, 200, generator=random)
+    error = {"normal": normal, "laplace": normal * (-torch.log(spread)).sqrt(), "heavy": normal / spread}[
+        kind
+    ]
+    error = 0.1 * error
+    none = torch.zeros_like(error, dtype=torch.bool)
+    weights = LossWeights(sigma_quantile=0.68)
+    wanted = math.log(float(error.abs().flatten().quantile(0.68)))
     costs = {
-        shift: float(sigma_term(torch.full_like(laplace, true_sigma + shift), laplace, near))
-        for shift in (-0.3, 0.0, 0.3)
+        shift: float(sigma_term(torch.full_like(error, wanted + shift), error, none, weights))
+        for shift in (-0.1, 0.0, 0.1)
     }
-    assert costs[0.0] < min(costs[-0.3], costs[0.3])
+    assert costs[0.0] < min(costs[-0.1], costs[0.1])
+
+
+def test_sky_is_taught_to_be_uncertain_even_where_it_is_right() -> None:
+    error, sky = torch.zeros(1, 1, 4, 4), torch.ones(1, 1, 4, 4, dtype=torch.bool)
+    costs = {
+        sigma: float(sigma_term(torch.full_like(error, math.log(sigma)), error, sky, LossWeights()))
+        for sigma in (0.01, FAR_UNCERTAINTY, 3.0)
+    }
+    assert costs[FAR_UNCERTAINTY] < min(costs[0.01], costs[3.0])
 
 
 def test_the_uncertainty_does_not_pull_at_the_depth(truth: Tensor) -> None:
     prediction = (truth + 0.1 * torch.randn_like(truth)).requires_grad_()
     sigma = torch.zeros_like(truth, requires_grad=True)
-    depth_loss(DepthOutput(prediction, sigma), batch_of(truth), LossWeights()).sigma.backward()  # type: ignore[no-untyped-call]
+    depth_loss(DepthOutput(prediction, sigma, prediction), batch_of(truth), LossWeights()).sigma.backward()  # type: ignore[no-untyped-call]
     assert prediction.grad is None
     assert sigma.grad is not None
 

@@ -161,7 +161,12 @@ def test_the_network_answers_at_the_size_of_the_picture() -> None:
 def test_gradients_reach_every_weight_that_is_not_frozen() -> None:
     torch.manual_seed(6)
     network = DepthNetwork(NetworkShape(frozen_stages=1)).train()
-    output = network(torch.randn(2, 3, 64, 64))
+    # What begins as zero passes no gradient to what lies before it.
+    for layer in (*network.hints.second, network.hints.context, network.correction.output):
+        torch.nn.init.normal_(cast(torch.nn.Conv2d, layer).weight, std=0.1)
+    points = torch.zeros(2, 2, 64, 64)
+    points[:, :, 20, 30] = 0.5
+    output = network(torch.randn(2, 3, 64, 64), torch.full((2, 1, 64, 64), 0.2), points)
     (output.log_inverse_depth.square().mean() + output.log_sigma.square().mean()).backward()
     for name, parameter in network.named_parameters():
         if parameter.requires_grad:

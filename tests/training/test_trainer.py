@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import resource
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -23,16 +25,22 @@ from training.errors import CheckpointError, TrainingSettingsError
 from training.networks.depth_network import NetworkShape
 from training.precision import autocast, resolve_precision
 from training.run_log import RunLog, RunSummary, read_log
-from training.settings import SizePhase, TrainingSettings
+from training.settings import LargePictures, SizePhase, TrainingSettings
 from training.train_command import train
 from training.trainer import Trainer
 
-SMALL = NetworkShape(channels=(4, 4, 4, 4, 4), head_channels=4, frozen_stages=6)
+SMALL = NetworkShape(
+    channels=(4, 4, 4, 4, 4),
+    head_channels=4,
+    frozen_stages=6,
+    hint_channels=(4, 4, 4, 4, 4),
+    correction_channels=4,
+)
 PHASES = (SizePhase(0.5, 64, 64, 2), SizePhase(1.0, 96, 64, 2))
 
 
 def settings(images: int = 12) -> TrainingSettings:
-    return TrainingSettings(images=images, phases=PHASES, shape=SMALL, precision="fp32")
+    return TrainingSettings(images=images, phases=PHASES, large=None, shape=SMALL, precision="fp32")
 
 
 @pytest.fixture
@@ -76,7 +84,7 @@ def test_training_learns_the_painted_ground(pool: FramePool) -> None:
 
 def test_a_run_in_minutes_ends_by_its_clock(pool: FramePool) -> None:
     seconds = iter(range(0, 10_000, 20))
-    run = TrainingSettings(minutes=1.0, phases=PHASES, shape=SMALL, precision="fp32")
+    run = TrainingSettings(minutes=1.0, phases=PHASES, large=None, shape=SMALL, precision="fp32")
     trainer = Trainer(run, pool, pretrained=False, seconds=lambda: float(next(seconds)))
     assert len(run_to_end(trainer)) == 3
 
@@ -89,6 +97,19 @@ def test_rates_rise_then_fall() -> None:
     assert rates[: top + 1] == sorted(rates[: top + 1])
     assert rates[top:] == sorted(rates[top:], reverse=True)
     assert rates[-1] == pytest.approx(run.final_rate)
+
+
+def test_some_pictures_of_the_last_phase_are_large() -> None:
+    run = TrainingSettings(images=12, phases=PHASES, large=LargePictures(3, 128, 64, 2), shape=SMALL)
+    assert [run.size_of(number, 0.2).width for number in range(6)] == [64] * 6
+    assert [run.size_of(number, 0.7).width for number in range(6)] == [128, 96, 96, 128, 96, 96]
+
+
+def test_large_pictures_have_sizes_that_the_network_takes() -> None:
+    with pytest.raises(TrainingSettingsError, match="130x64"):
+        LargePictures(3, 130, 64, 2)
+    with pytest.raises(TrainingSettingsError, match="one of 0"):
+        LargePictures(0, 128, 64, 2)
 
 
 def test_pictures_grow_at_the_end_of_a_phase() -> None:
@@ -145,6 +166,81 @@ def test_a_checkpoint_survives_a_crash_while_it_is_written(pool: FramePool, tmp_
     trainer.save(path)
     (path.parent / "checkpoint.pt.part").write_bytes(b"half of it")
     assert Checkpoint.load(path).settings == trainer.settings
+
+
+def test_a_full_disk_leaves_the_last_good_checkpoint(pool: FramePool, tmp_path: Path) -> None:
+    trainer = Trainer(settings(), pool, pretrained=False)
+    path = tmp_path / "checkpoint.pt"
+    trainer.save(path)
+    good = path.read_bytes()
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, hard))
+    try:
+        with pytest.raises(CheckpointError, match=r"checkpoint\.pt cannot be written.*before it is whole"):
+            trainer.save(path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert path.read_bytes() == good
+    assert list(tmp_path.glob("*.part")) == []
+
+
+def changed(path: Path, **entries: object) -> Path:
+    """The checkpoint with other entries."""
+    content = torch.load(path, weights_only=True)
+    torch.save({**content, **entries}, path)
+    return path
+
+
+def test_an_old_checkpoint_is_refused_with_a_way_out(pool: FramePool, tmp_path: Path) -> None:
+    path = tmp_path / "old.pt"
+    Trainer(settings(), pool, pretrained=False).save(path)
+    with pytest.raises(CheckpointError, match=r"old\.pt is a checkpoint of format 1, 2 is needed.*--init"):
+        Checkpoint.load(changed(path, format=1))
+
+
+def test_a_checkpoint_of_another_network_is_named(pool: FramePool, tmp_path: Path) -> None:
+    path = tmp_path / "other.pt"
+    Trainer(settings(), pool, pretrained=False).save(path)
+    with pytest.raises(CheckpointError, match="network 'monodepth2', 'lite0-fan-eca-hints' is needed"):
+        Checkpoint.load(changed(path, architecture="monodepth2"))
+
+
+def test_a_run_starts_from_the_weights_of_an_older_format(pool: FramePool, tmp_path: Path) -> None:
+    older = Trainer(settings(), pool, pretrained=False)
+    run_to_end(older)
+    path = tmp_path / "old.pt"
+    older.save(path)
+    average = dict(older.checkpoint().average)
+    hints = {name: average.pop(name) for name in list(average) if name.startswith(("hints.", "correction."))}
+    average["sigma_head.output.weight"] = torch.ones(1)
+    changed(path, format=1, average=average, settings={})
+
+    trainer = Trainer(replace(settings(), seed=7), pool, pretrained=False)
+    assert trainer.start_from(path) == sum(
+        v.numel() for k, v in average.items() if k != "sigma_head.output.weight"
+    )
+    state = trainer.network.state_dict()
+    for name, value in average.items():
+        if name in state:
+            assert torch.equal(state[name], value), name
+    assert any(not torch.equal(state[name], value) for name, value in hints.items())
+    assert torch.equal(
+        trainer.checkpoint().average["depth_head.output.weight"], state["depth_head.output.weight"]
+    )
+
+
+def test_weights_of_which_none_fits_are_refused(pool: FramePool, tmp_path: Path) -> None:
+    path = tmp_path / "foreign.pt"
+    torch.save({"average": {"layer.weight": torch.zeros(3)}}, path)
+    with pytest.raises(CheckpointError, match=r"foreign\.pt: none of its 1 weights fits"):
+        Trainer(settings(), pool, pretrained=False).start_from(path)
+
+
+def test_a_file_without_averaged_weights_starts_nothing(pool: FramePool, tmp_path: Path) -> None:
+    path = tmp_path / "bare.pt"
+    torch.save({"network": {}}, path)
+    with pytest.raises(CheckpointError, match="no averaged weights"):
+        Trainer(settings(), pool, pretrained=False).start_from(path)
 
 
 def test_a_missing_checkpoint_is_named(tmp_path: Path) -> None:
@@ -205,7 +301,7 @@ def test_the_log_tells_means_and_can_be_read_back(pool: FramePool, tmp_path: Pat
 
 
 def test_the_time_left_follows_the_pace_so_far() -> None:
-    summary = RunSummary(1, 8, 300.0, 0.25, 0.1, 1.0, 0.5, 0.2, 0.1, 0.0, 0.6, 6)
+    summary = RunSummary(1, 8, 300.0, 0.25, 0.1, 1.0, 0.5, 0.2, 0.1, 0.0, 0.5, 0.6, 6)
     assert summary.left_s == pytest.approx(900.0)
     assert "15.0 min left" in summary.line()
 
@@ -214,7 +310,7 @@ def test_the_command_trains_and_refuses_to_overwrite(
     pool: FramePool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def small(**arguments: object) -> TrainingSettings:
-        return TrainingSettings(**arguments, phases=PHASES, shape=SMALL)  # type: ignore[arg-type]
+        return TrainingSettings(**arguments, phases=PHASES, large=None, shape=SMALL)  # type: ignore[arg-type]
 
     monkeypatch.setattr(training.settings, "TrainingSettings", small)
     app = typer.Typer()
@@ -229,6 +325,11 @@ def test_the_command_trains_and_refuses_to_overwrite(
     longer = [*words[:-1], "12", "--resume"]
     assert CliRunner().invoke(app, longer, catch_exceptions=False).exit_code == 0
     assert Checkpoint.load(tmp_path / "run" / "checkpoint.pt").images == 12
+
+
+def test_a_run_either_starts_or_goes_on(tmp_path: Path) -> None:
+    with pytest.raises(TrainingSettingsError, match="--resume"):
+        train(data=tmp_path, output=tmp_path, init=tmp_path / "old.pt", resume=True)
 
 
 def test_a_run_has_one_length(tmp_path: Path) -> None:
