@@ -5,11 +5,14 @@ Pixel centres are at whole numbers, x to the right, y down; cameras look along +
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
+from typing import Any
 
 import torch
 import torch.nn.functional as F  # noqa: N812 (torch's own convention)
 from torch import Tensor
+from torch.autograd.function import once_differentiable
 
 from training.errors import PhotometricShapeError
 
@@ -17,8 +20,6 @@ MIN_DEPTH_RATIO = 1e-3
 """A point is in front of the source camera if its depth there exceeds this part of that in the target."""
 
 _SMALL_ANGLE_SQUARED = 1e-3
-_OUTSIDE = -2.0
-"""A coordinate of grid_sample left of and above every picture (the picture spans -1 to 1)."""
 
 
 def transform_from_pose(pose: Tensor, inverse: bool = False) -> Tensor:
@@ -103,7 +104,7 @@ def reproject(source: Tensor, depth: Tensor, intrinsics: Tensor, source_from_tar
 
     Returns:
         The source frame sampled bilinearly at p2, (N, 3, H, W). Outside of the source frame its border is
-        repeated; a point behind the source camera shows its upper left pixel. Neither has a gradient.
+        repeated; a point behind the source camera shows the picture's centre. Neither has a gradient.
 
     Raises:
         PhotometricShapeError: shapes that do not belong together.
@@ -139,10 +140,10 @@ class PixelMotion:
             [[2.0 / width, 0.0, 1.0 / width - 1.0], [0.0, 2.0 / height, 1.0 / height - 1.0], [0.0, 0.0, 1.0]]
         )
         grid_from_camera = grid_from_pixel @ camera
-        infinite = grid_from_camera @ transform[:, :3, :3] @ torch.linalg.inv(camera)
-        pixels = pixel_grid(height, width, transform.dtype, transform.device)
-        self._at_infinity = (infinite @ pixels).view(-1, 3, height, width)
-        self._per_inverse_depth = (grid_from_camera @ transform[:, :3, 3:])[..., None]
+        at_infinity = grid_from_camera @ transform[:, :3, :3] @ torch.linalg.inv(camera)
+        self._motion = torch.cat((at_infinity, grid_from_camera @ transform[:, :3, 3:]), dim=2)
+        self._pixels = pixel_grid(height, width, transform.dtype, transform.device)
+        self._at_infinity = (at_infinity.detach() @ self._pixels).view(-1, 3, height, width)
 
     def sample(self, source: Tensor, inverse_depth: Tensor) -> Tensor:
         """The source (N, C, H, W) seen from the target, whose inverse depth is (N, 1, H, W)."""
@@ -156,21 +157,53 @@ class PixelMotion:
         return rebuilt
 
     def grid(self, inverse_depth: Tensor) -> Tensor:
-        """(N, H, W, 2) coordinates for grid_sample with align_corners=False."""
-        ray, shift = self._at_infinity, self._per_inverse_depth
-        ratio = torch.addcmul(ray[:, 2:], inverse_depth, shift[:, 2:])
-        in_front = ratio > MIN_DEPTH_RATIO
-        # Never divides by what is behind: neither value nor gradient of such a point may exist.
-        scale = torch.where(in_front, ratio, 1.0).reciprocal()
-        across = torch.addcmul(ray[:, :1], inverse_depth, shift[:, :1]) * scale
-        down = torch.addcmul(ray[:, 1:2], inverse_depth, shift[:, 1:2]) * scale
-        return torch.stack(
-            (
-                torch.where(in_front, across, _OUTSIDE).squeeze(1),
-                torch.where(in_front, down, _OUTSIDE).squeeze(1),
-            ),
-            dim=-1,
-        )
+        """(N, H, W, 2) coordinates for grid_sample with align_corners=False; 0, 0 for a point behind."""
+        inverse_depth = inverse_depth.to(self._motion.dtype)
+        grid: Tensor = _Grid.apply(inverse_depth, self._motion, self._at_infinity, self._pixels)  # type: ignore[no-untyped-call]
+        return grid
+
+
+class _Grid(torch.autograd.Function):
+    """Across (a0 + q b0) / (a2 + q b2), down (a1 + q b1) / (a2 + q b2), for motion [A | b] and a = A p.
+
+    By hand, because autograd would write a picture-sized gradient of `a` only to sum it up into A's.
+    """
+
+    @staticmethod
+    def forward(
+        ctx: Any, inverse_depth: Tensor, motion: Tensor, at_infinity: Tensor, pixels: Tensor
+    ) -> Tensor:
+        count, _, height, width = inverse_depth.shape
+        shift = motion[:, :, 3:, None]
+        ratio = torch.addcmul(at_infinity[:, 2:], inverse_depth, shift[:, 2:])
+        # What is not in front gets the factor 1 / inf = 0, and with it no gradient.
+        factor = F.threshold(ratio, MIN_DEPTH_RATIO, math.inf).reciprocal_()
+        grid = inverse_depth.new_empty((count, height, width, 2))
+        for axis in (0, 1):
+            place = torch.addcmul(at_infinity[:, axis : axis + 1], inverse_depth, shift[:, axis : axis + 1])
+            torch.mul(place[:, 0], factor[:, 0], out=grid[..., axis])
+        ctx.save_for_backward(inverse_depth, motion, factor, grid)
+        ctx.pixels = pixels
+        return grid
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, by_grid: Tensor) -> tuple[Tensor | None, Tensor | None, None, None]:
+        inverse_depth, motion, factor, grid = ctx.saved_tensors
+        count, _, height, width = inverse_depth.shape
+        by_point = inverse_depth.new_empty((count, 3, height, width))
+        torch.mul(by_grid[..., 0], factor[:, 0], out=by_point[:, 0])
+        torch.mul(by_grid[..., 1], factor[:, 0], out=by_point[:, 1])
+        torch.mul(by_point[:, 0], grid[..., 0], out=by_point[:, 2])
+        by_point[:, 2].addcmul_(by_point[:, 1], grid[..., 1]).neg_()
+        by_point = by_point.flatten(2)
+        by_inverse_depth = by_motion = None
+        if ctx.needs_input_grad[0]:
+            by_inverse_depth = (motion[:, :, 3:].transpose(1, 2) @ by_point).view_as(inverse_depth)
+        if ctx.needs_input_grad[1]:
+            by_shift = by_point @ inverse_depth.flatten(2).transpose(1, 2)
+            by_motion = torch.cat((by_point @ ctx.pixels.T, by_shift), dim=2)
+        return by_inverse_depth, by_motion, None, None
 
 
 @lru_cache(maxsize=16)

