@@ -14,7 +14,7 @@ from training.evaluation_frames import EvaluationFrame
 from training.evaluation_knowledge import Knowledge, vehicle_knowledge
 from training.evaluation_obstacles import SCAN_RANGE_M, ElementErrors, compare_scans
 from training.evaluation_sheet import SheetRow
-from training.evaluation_sources import Answer, Sources
+from training.evaluation_sources import PERFECT, Answer, Sources
 from training.metrics import measurable, median_factor
 from uavdepth.scanner import ObstacleScanner
 
@@ -69,7 +69,8 @@ def measure_frame(sources: Sources, item: EvaluationFrame) -> MeasuredFrame:
     """Run every source on a rendered frame and compare it with the truth, nearest obstacles included."""
     frame = item.frame
     knowledge = vehicle_knowledge(item, sources.point_counts)
-    answers = sources.answers(frame.image_bgr, knowledge)
+    answers = dict(sources.answers(frame.image_bgr, knowledge))
+    answers[PERFECT] = sources.perfect(frame.depth_m, frame.camera)
     scored = knowledge.without_points(frame.depth_m)
     scanner = ObstacleScanner(frame.camera, frame.mount, max_distance_m=SCAN_RANGE_M)
     truth = scanner.scan(frame.depth_m, frame.attitude, frame.height_m)

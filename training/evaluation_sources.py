@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from training.baselines import constant_depth, flat_ground_depth, nearest_point_depth
 from training.evaluation_knowledge import HintMode, Knowledge, hint_modes, points_ratio
+from uavdepth.camera import CameraModel
 from uavdepth.depth_model import DepthModel
 from uavdepth.ground_scale import GroundScaler
 
@@ -19,6 +21,9 @@ _RESCALED = "none, "
 GROUND_SCALED = _RESCALED + "scaled by the ground"
 THERE = _RESCALED + "on those frames"
 """What the ground's scale adds shows only against the same frames without it."""
+
+PERFECT = "a perfect network"
+"""The truth at the network's pixels: in scans it shows what resolution and the vehicle's errors cost."""
 
 PLAUSIBLE_FACTORS = (0.4, 2.5)
 """Corrections by the ground that are believed of a metric network, as in flight."""
@@ -68,7 +73,7 @@ class Sources:
     def __init__(self, model: DepthModel, point_counts: Sequence[int]) -> None:
         self.model = model
         self.point_counts = tuple(point_counts)
-        self.takes = frozenset(getattr(model.card, "hints", ()))
+        self.takes = frozenset(model.card.hints)
         self.modes = hint_modes(self.takes, self.point_counts)
 
     @property
@@ -84,7 +89,8 @@ class Sources:
     @property
     def labels(self) -> tuple[str, ...]:
         """Names of all sources in the order of the tables: the network first."""
-        return (*self.networks, CONSTANT, FLAT_GROUND, *(nearest_of(count) for count in self.point_counts))
+        nearest = (nearest_of(count) for count in self.point_counts)
+        return (*self.networks, CONSTANT, FLAT_GROUND, *nearest, PERFECT)
 
     @property
     def richest(self) -> HintMode:
@@ -105,11 +111,15 @@ class Sources:
                 answers[nearest_of(count)] = Answer(nearest_point_depth(knowledge.camera, points))
         return answers
 
+    def perfect(self, truth_m: NDArray[np.float32], camera: CameraModel) -> Answer:
+        """The (H, W) truth as a network that is always right would say it: at its own size, brought back."""
+        small = cv2.resize(truth_m, self.model.card.input_size(camera), interpolation=cv2.INTER_NEAREST_EXACT)
+        back = cv2.resize(small, (camera.width, camera.height), interpolation=cv2.INTER_NEAREST_EXACT)
+        return Answer(np.asarray(back, np.float32))
+
     def _infer(self, image_bgr: NDArray[np.uint8], knowledge: Knowledge, mode: HintMode) -> Answer:
-        hints = (knowledge.hints(mode),) if self.takes else ()
-        found = self.model.infer(image_bgr, knowledge.camera, *hints)
-        metric = self.model.card.metric or mode.ground or mode.points > 0
-        return Answer(found.depth_m, found.relative_sigma, metric)
+        found = self.model.infer(image_bgr, knowledge.camera, knowledge.hints(mode))
+        return Answer(found.depth_m, found.relative_sigma, self.model.card.metric)
 
     def _scaled(self, plain: Answer, knowledge: Knowledge) -> dict[str, Answer]:
         """What is done for a network that takes no hints: one factor from the ground, or from points."""

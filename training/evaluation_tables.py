@@ -11,7 +11,7 @@ from training.evaluation_bands import band_names
 from training.evaluation_doubt import NOMINAL_COVERAGE, SIGMAS
 from training.evaluation_obstacles import FALSE_ALARM_M, MEASURED_M
 from training.evaluation_report import EvaluationReport, mean_points
-from training.evaluation_sources import is_rescaled
+from training.evaluation_sources import PERFECT, THERE, is_rescaled
 from training.evaluation_summary import SourceSummary
 from training.metrics import DepthMetrics
 
@@ -66,6 +66,7 @@ def _seven(title: str, rows: Sequence[SourceSummary]) -> Table:
 
 def _shown(rows: Sequence[SourceSummary], scale: str) -> list[SourceSummary]:
     """Rows worth showing: at the truth's median every rescaled network is the same network."""
+    rows = [row for row in rows if row.label != PERFECT]
     return [row for row in rows if scale == _METRES or not is_rescaled(row.label)]
 
 
@@ -139,7 +140,8 @@ def _elements(title: str, rows: Sequence[SourceSummary]) -> Table:
 
 def _by_group(report: EvaluationReport, groups: Sequence[str]) -> Table:
     """Abs Rel of each group: median-scaled without hints, metric with them."""
-    labels = [label for label in report.labels if any(label in item.sources for item in report.errors)]
+    there = dict.fromkeys(label for item in report.errors for label in item.sources)
+    labels = [label for label in report.labels if label in there and label not in (THERE, PERFECT)]
     table = _table("by group: Abs Rel, median-scaled / metric", ("", "frames"), labels)
     for group in groups:
         errors = report.of([group])

@@ -10,10 +10,16 @@ from frames import ground_frame
 from hypothesis import given
 from hypothesis import strategies as st
 
-from training.baselines import TRAINING_MEDIAN_DEPTH_M, constant_depth, flat_ground_depth
+from training.baselines import (
+    TRAINING_MEDIAN_DEPTH_M,
+    constant_depth,
+    flat_ground_depth,
+    nearest_point_depth,
+)
 from training.metrics import DEPTH_CAP_M, MIN_PIXELS, DepthMetrics, depth_metrics, median_factor
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
+from uavdepth.hints import PointHints
 
 
 def filled(*values: float) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
@@ -49,6 +55,36 @@ def test_a_wrong_scale_alone_is_mended_by_the_median(factor: float) -> None:
     mended = depth_metrics(truth, predicted, found)
     assert mended is not None
     assert mended.abs_rel == pytest.approx(0.0, abs=1e-5)
+
+
+@given(st.integers(0, 1000), st.floats(0.05, 20.0))
+def test_median_scaled_errors_do_not_depend_on_the_networks_unit(seed: int, unit: float) -> None:
+    rng = np.random.default_rng(seed)
+    truth = rng.uniform(1.0, 60.0, (16, 16)).astype(np.float32)
+    predicted = (truth * np.exp(rng.normal(0.0, 0.3, truth.shape))).astype(np.float32)
+    errors = []
+    for answer in (predicted, predicted * np.float32(unit)):
+        factor = median_factor(truth, answer)
+        assert factor is not None
+        found = depth_metrics(truth, answer, factor)
+        assert found is not None
+        errors.append(found.as_dict())
+    assert errors[0] == pytest.approx(errors[1], rel=1e-3, abs=1e-3)
+
+
+@given(st.integers(0, 1000))
+def test_the_shares_below_a_ratio_grow_with_the_ratio(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    truth = rng.uniform(0.1, 79.0, (16, 16)).astype(np.float32)
+    found = depth_metrics(truth, rng.uniform(0.1, 200.0, truth.shape).astype(np.float32))
+    assert found is not None
+    assert 0.0 <= found.below_125 <= found.below_125_2 <= found.below_125_3 <= 1.0
+    assert found.abs_rel >= 0.0
+
+
+@pytest.mark.parametrize("nothing", [0.0, -1.0, np.nan, np.inf])
+def test_sky_zeros_and_missing_truth_are_not_measured(nothing: float) -> None:
+    assert depth_metrics(filled(5.0, nothing), filled(6.0, 1.0)) == depth_metrics(filled(5.0), filled(6.0))
 
 
 def test_sky_and_whatever_is_beyond_the_cap_is_not_measured() -> None:
@@ -106,3 +142,18 @@ def test_constant_depth_never_looks() -> None:
     answer = constant_depth(CameraModel.from_fov(64, 32, 80.0))
     assert answer.shape == (32, 64)
     assert np.unique(answer) == pytest.approx([TRAINING_MEDIAN_DEPTH_M])
+
+
+def test_the_nearest_point_fills_the_picture_around_it() -> None:
+    camera = CameraModel.from_fov(64, 32, 80.0)
+    points = PointHints(np.array([[5.0, 16.0], [60.0, 16.0]]), np.array([2.0, 9.0]), np.full(2, 0.05))
+    answer = nearest_point_depth(camera, points)
+    assert np.all(answer[:, :20] == 2.0)
+    assert np.all(answer[:, 50:] == 9.0)
+    assert set(np.unique(answer)) == {2.0, 9.0}
+
+
+def test_without_any_point_the_depth_is_the_constant_one() -> None:
+    camera = CameraModel.from_fov(64, 32, 80.0)
+    nothing = PointHints(np.empty((0, 2)), np.empty(0), np.empty(0))
+    assert np.array_equal(nearest_point_depth(camera, nothing), constant_depth(camera))
