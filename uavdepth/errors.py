@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 
 class UavDepthError(Exception):
     """Base of every error that this project raises on purpose: its text is fit to show a user."""
@@ -16,7 +18,16 @@ class ImageSizeError(UavDepthError, ValueError):
 
 
 class ModelCardError(UavDepthError, ValueError):
-    """A network file without a card, or with a card that lacks a key or holds an impossible value."""
+    """A network file without a card, or with a card that lacks a key or holds an impossible value.
+
+    Args:
+        text: what is wrong, with the file.
+        complaints: the same one by one, without the file.
+    """
+
+    def __init__(self, text: str, complaints: Sequence[str] = ()) -> None:
+        super().__init__(text)
+        self.complaints = tuple(complaints) or (text,)
 
 
 class ModelFileError(UavDepthError):

@@ -152,7 +152,7 @@ class ModelCard(BaseModel):
             *self._complaints_of_hints(),
         ]
         if complaints:
-            raise PydanticCustomError("keys", "{text}", {"text": "; ".join(complaints)})
+            raise PydanticCustomError("keys", "{text}", {"text": "\n".join(complaints)})
         return self
 
     def _complaints_of_version(self) -> list[str]:
@@ -232,7 +232,8 @@ class ModelCard(BaseModel):
         try:
             return cls.model_validate_json(text)
         except ValidationError as error:
-            raise ModelCardError(f"{source}: {'; '.join(explain(error))}") from error
+            complaints = _complaints(error)
+            raise ModelCardError(f"{source}: {'; '.join(complaints)}", complaints) from error
 
     @classmethod
     def from_toml(cls, data: bytes, source: str) -> ModelCard:
@@ -254,7 +255,7 @@ class ModelCard(BaseModel):
         return self.model_dump_json(indent=2, exclude=left_out, exclude_none=True)
 
 
-def explain(error: ValidationError) -> list[str]:
+def _complaints(error: ValidationError) -> list[str]:
     """Every complaint about a card, each by the key it is about."""
     texts = []
     for item in error.errors(include_url=False):
@@ -264,7 +265,7 @@ def explain(error: ValidationError) -> list[str]:
         elif item["type"] == "extra_forbidden":
             texts.append(f"the model card has the unknown key '{key}'")
         elif item["type"] == "keys":
-            texts.append(item["msg"])
+            texts += item["msg"].splitlines()
         elif not key:
             texts.append(f"the model card cannot be read: {item['msg']}")
         else:
