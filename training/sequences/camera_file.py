@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -43,7 +44,10 @@ def read_camera(path: Path) -> CameraModel:
     width, height = int(numbers["width"]), int(numbers["height"])
     if (width, height) != (numbers["width"], numbers["height"]):
         raise TrainingDataError(f"{path}: width and height are whole numbers of pixels")
-    distortion = tuple(_number(path, "distortion", value) for value in values.get("distortion", ()))
+    listed = values.get("distortion", [])
+    if not isinstance(listed, list):
+        raise TrainingDataError(f"{path}: distortion is {listed!r}: a list of numbers is needed")
+    distortion = tuple(_number(path, "distortion", value) for value in listed)
     try:
         if by_angle:
             return CameraModel.from_fov(width, height, numbers["horizontal_fov_deg"])
@@ -65,8 +69,8 @@ def _read_table(path: Path) -> dict[str, Any]:
 
 
 def _number(path: Path, key: str, value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise TrainingDataError(f"{path}: {key} is {value!r}: a number is needed")
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise TrainingDataError(f"{path}: {key} is {value!r}: a finite number is needed")
     return float(value)
 
 

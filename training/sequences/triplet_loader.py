@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Generator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import count
@@ -149,8 +149,8 @@ class TripletLoader:
             torch.from_numpy(intrinsics),
         )
 
-    def stream(self, first: int = 0, stop: int | None = None) -> Iterator[TripletBatch]:
-        """Batches from number `first` on, up to `stop` if there is one, made ahead on a thread of its own."""
+    def stream(self, first: int = 0, stop: int | None = None) -> Generator[TripletBatch, None, None]:
+        """Batches from number `first` on, before `stop` if given, made ahead on a thread of its own."""
         # One decoding thread beside the training step: OpenCV's own threads would only fight over its cores.
         cv2.setNumThreads(1)
         numbers = iter(range(first, stop)) if stop is not None else count(first)
