@@ -11,7 +11,7 @@ WIDTH, HEIGHT = 128, 96
 
 IMAGE_STEPS = 30_000
 BATCH = 8
-START_IMAGES = 30_000
+START_IMAGES = 16_000
 """Pictures shown to the encoder that all networks start from."""
 
 SCENES = ("mountain", "city")
