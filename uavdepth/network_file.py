@@ -157,8 +157,8 @@ def _inputs_that_do_not_fit(card: ModelCard, inputs: dict[str, Any]) -> Iterator
             isinstance(size, int) for size, want in zip(shape, wanted, strict=True) if isinstance(want, str)
         ):
             yield Problem(
-                f"the card's multiple_of says that the size is free, the network's input is {shape}",
-                "take multiple_of out and set input_width and input_height to that size",
+                f"the card's multiple_of says that the size is free: {wanted}; the network's input is {shape}",
+                "take multiple_of out and set input_width and input_height to that size, or correct layout",
             )
     if card.multiple_of is not None:
         for key in ("input_width", "input_height"):

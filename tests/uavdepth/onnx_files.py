@@ -94,3 +94,91 @@ def write_red_network(
         helper.set_model_props(model, {CARD_METADATA_KEY: json.dumps(card)})
     onnx.save(model, str(path))
     return path
+
+
+def hinted_card(**changes: Any) -> dict[str, Any]:
+    """Card of `write_hinted_network`."""
+    return card_values(**{"card_version": 2, "hints": ["ground", "points"], "uncertainty": True, **changes})
+
+
+def write_hinted_network(
+    path: Path, card: dict[str, Any] | None = None, *, unhinted: float = 1e-3, sigma: float = -2.0
+) -> Path:
+    """A network that believes its hints: a pixel's inverse depth is the larger one of ground and point.
+
+    Args:
+        path: the file to write.
+        card: the card to put into the metadata; None: `hinted_card()`.
+        unhinted: inverse depth where there is neither.
+        sigma: log of relative sigma everywhere.
+    """
+    shape = [1, 1, HEIGHT, WIDTH]
+    inputs = [
+        helper.make_tensor_value_info(name, TensorProto.FLOAT, [1, channels, HEIGHT, WIDTH])
+        for name, channels in (("image", 3), ("ground", 1), ("points", 2))
+    ]
+    outputs = [
+        helper.make_tensor_value_info(name, TensorProto.FLOAT, shape)
+        for name in ("log_inverse_depth", "log_sigma")
+    ]
+    constants = [
+        numpy_helper.from_array(np.array([0], dtype=np.int64), "first"),
+        numpy_helper.from_array(np.array([0.0], dtype=np.float32), "zero"),
+        numpy_helper.from_array(np.array([unhinted], dtype=np.float32), "unhinted"),
+        numpy_helper.from_array(np.array([sigma], dtype=np.float32), "sigma"),
+    ]
+    nodes = [
+        helper.make_node("Gather", ["image", "first"], ["red"], axis=1),
+        helper.make_node("Mul", ["red", "zero"], ["nothing"]),
+        helper.make_node("Gather", ["points", "first"], ["known"], axis=1),
+        helper.make_node("Max", ["ground", "known", "unhinted"], ["inverse"]),
+        helper.make_node("Log", ["inverse"], ["log"]),
+        helper.make_node("Add", ["log", "nothing"], ["log_inverse_depth"]),
+        helper.make_node("Add", ["nothing", "sigma"], ["log_sigma"]),
+    ]
+    model = helper.make_model(
+        helper.make_graph(nodes, "hinted", inputs, outputs, constants),
+        opset_imports=[helper.make_opsetid("", 17)],
+    )
+    model.ir_version = 8
+    helper.set_model_props(model, {CARD_METADATA_KEY: json.dumps(hinted_card() if card is None else card)})
+    onnx.save(model, str(path))
+    return path
+
+
+def write_formatted_network(
+    path: Path,
+    *,
+    layout: str = "nchw",
+    output_shape: tuple[int, ...] = (1, 1, HEIGHT, WIDTH),
+    element: int = TensorProto.FLOAT,
+) -> Path:
+    """A network without a card whose output is its first channel, in the shape and number format asked for.
+
+    Args:
+        path: the file to write.
+        layout: "nchw" or "nhwc", of the input.
+        output_shape: of the output.
+        element: number format of input and output.
+    """
+    size = [1, 3, HEIGHT, WIDTH] if layout == "nchw" else [1, HEIGHT, WIDTH, 3]
+    constants = [
+        numpy_helper.from_array(np.array(0, dtype=np.int64), "first"),
+        numpy_helper.from_array(np.array(output_shape, dtype=np.int64), "shape"),
+    ]
+    axis = 1 if layout == "nchw" else 3
+    nodes = [
+        helper.make_node("Gather", ["x", "first"], ["channel"], axis=axis),
+        helper.make_node("Reshape", ["channel", "shape"], ["y"]),
+    ]
+    graph = helper.make_graph(
+        nodes,
+        "formatted",
+        [helper.make_tensor_value_info("x", element, size)],
+        [helper.make_tensor_value_info("y", element, list(output_shape))],
+        constants,
+    )
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)])
+    model.ir_version = 8
+    onnx.save(model, str(path))
+    return path
