@@ -1,4 +1,4 @@
-"""Which provider runs a network: the best that is installed and works, and one word if that is a lesser one."""
+"""Which provider runs a network: the best that is installed and works; a word where that is a lesser one."""
 
 from __future__ import annotations
 
