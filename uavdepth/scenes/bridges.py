@@ -51,7 +51,7 @@ def add_bridge(
     for part in np.linspace(0.0, 1.0, int(np.ceil(length / span_m)) + 1):
         for side in (-0.35, 0.35):
             pier = low + part * (high - low) + side * width_m * across
-            add_box(builder, (pier[0], pier[1]), (0.45, 0.45), ground_m - 0.3, bottom, "concrete", tint, turn)
+            add_box(builder, (pier[0], pier[1]), (0.45, 0.45), ground_m - 1.0, bottom, "concrete", tint, turn)
     rail: FenceKind = "railing" if rng.random() < 0.6 else "mesh"
     for side in (-0.5, 0.5):
         line = np.array([low, high]) + (side * (width_m - 0.16)) * across - [0.0, 0.0, thick]

@@ -38,7 +38,7 @@ _TREES: tuple[tuple[TreeKind, ...], ...] = (
     ("broadleaf",),
     ("poplar", "broadleaf"),
     ("conifer", "broadleaf"),
-    ("dead", "conifer"),
+    ("bare", "conifer"),
 )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from uavdepth.scenes.bars import add_bars, add_wires
 from uavdepth.scenes.bridges import add_bridge
+from uavdepth.scenes.corridor import Corridor
 from uavdepth.scenes.cranes import add_tower_crane
 from uavdepth.scenes.fences import FenceKind, add_fence
 from uavdepth.scenes.mesh import MeshBuilder
@@ -19,15 +20,12 @@ from uavdepth.scenes.people import Crowd
 from uavdepth.scenes.scaffolding import add_scaffold
 from uavdepth.scenes.shelters import add_awning, add_bus_shelter, add_covered_walk, add_stall
 from uavdepth.scenes.solids import Point, Rect, add_box
-from uavdepth.scenes.street_grid import CORRIDOR_M, KERB_M, PAVEMENT_M, REACH_M, Street
+from uavdepth.scenes.street_grid import KERB_M, PAVEMENT_M, REACH_M, Street
 from uavdepth.scenes.textures_facade import FACADE_CELL_M
 from uavdepth.scenes.traffic import Traffic
 
 _LIVELY_M = REACH_M - 12.0
 """How far from the origin anything is added."""
-
-_FRONT_HALF_M = 13.0
-"""Half the width of the front at the corridor's end that stays free to see."""
 
 
 @dataclass(frozen=True)
@@ -72,14 +70,8 @@ class CityPlan:
 
     def keeps_free(self, low: Point, high: Point) -> bool:
         """Whether the rectangle between two points lies in reach, off the corridor and off its end."""
-        north_low, north_high = sorted((low[0], high[0]))
-        east_low, east_high = sorted((low[1], high[1]))
         reaches = max(abs(v) for v in (*low, *high)) < _LIVELY_M
-        in_corridor = north_high > -8.0 and north_low < 46.0
-        in_corridor &= east_high > -CORRIDOR_M - 0.4 and east_low < CORRIDOR_M + 0.4
-        before_front = north_high > self.facade_m - 17.0 and north_low < self.facade_m + 1.0
-        before_front &= east_high > -_FRONT_HALF_M and east_low < _FRONT_HALF_M
-        return reaches and not in_corridor and not before_front
+        return reaches and Corridor(self.facade_m).is_free(low, high)
 
     def streets(self) -> list[tuple[int, Street, list[Street]]]:
         """Axis (1 runs north, 0 runs east), street, and the streets that cross it."""
@@ -95,10 +87,10 @@ class CityPlan:
 def add_city_life(builder: MeshBuilder, seed: int, plan: CityPlan) -> None:
     """Fill the streets of one seed."""
     rng = np.random.default_rng([seed, 0x11FE])
-    _add_traffic(builder, rng, plan)
-    _add_people(builder, rng, plan)
+    add_traffic(builder, rng, plan, gap_m=rng.uniform(14.0, 60.0))
+    add_pedestrians(builder, rng, plan, apart_m=rng.uniform(18.0, 70.0))
     _add_kerb_things(builder, rng, plan)
-    _add_overhead(builder, rng, plan)
+    add_overhead(builder, rng, plan, lines=0.3)
     _add_house_things(builder, rng, plan)
     _add_bridges(builder, rng, plan)
     if rng.random() < 0.4:
@@ -117,10 +109,9 @@ def _off_crossings(along_m: float, others: list[Street], margin_m: float) -> boo
     return min(abs(along_m - other.middle_m) - other.half_width_m for other in others) > margin_m
 
 
-def _add_traffic(builder: MeshBuilder, rng: np.random.Generator, plan: CityPlan) -> None:
-    """Vehicles keep to the right."""
+def add_traffic(builder: MeshBuilder, rng: np.random.Generator, plan: CityPlan, gap_m: float) -> None:
+    """Put vehicles on all lanes, `gap_m` apart on average. They keep to the right."""
     traffic = Traffic(rng)
-    gap_m = rng.uniform(14.0, 60.0)
     for axis, street, others in plan.streets():
         half_lane = 0.5 * (street.half_road_m - 2.0)
         for way in (1.0, -1.0):
@@ -152,9 +143,9 @@ def _edges(plan: CityPlan) -> list[tuple[int, float, float, float, float]]:
     return edges
 
 
-def _add_people(builder: MeshBuilder, rng: np.random.Generator, plan: CityPlan) -> None:
+def add_pedestrians(builder: MeshBuilder, rng: np.random.Generator, plan: CityPlan, apart_m: float) -> None:
+    """Put people on the pavements, about one on every `apart_m` of kerb."""
     crowd = Crowd(rng)
-    apart_m = rng.uniform(18.0, 70.0)
     for axis, line, low, high, inwards in _edges(plan):
         for _ in range(rng.poisson((high - low) / apart_m)):
             along, depth = rng.uniform(low, high), rng.uniform(1.3, 2.9)
@@ -192,20 +183,20 @@ def _add_kerb_things(builder: MeshBuilder, rng: np.random.Generator, plan: CityP
                 add_bus_shelter(builder, *spot, KERB_M, outwards)
 
 
-def _add_overhead(builder: MeshBuilder, rng: np.random.Generator, plan: CityPlan) -> None:
-    """Lines along some streets, lamps on wires across others."""
+def add_overhead(builder: MeshBuilder, rng: np.random.Generator, plan: CityPlan, lines: float) -> None:
+    """Hang lines along that share of the streets, and lamps on wires across others."""
     for axis, street, others in plan.streets():
         luck = rng.random()
         side = float(rng.choice([-1.0, 1.0]))
         line = street.middle_m + side * (street.half_road_m + 0.45)
         crosses_corridor = axis == 0 and -14.0 < street.middle_m < plan.facade_m + 1.0
         ends_at_front = axis == 1 and street.middle_m == 0.0
-        if luck < 0.3 and not crosses_corridor:
+        if luck < lines and not crosses_corridor:
             last = plan.facade_m - 24.0 if ends_at_front else _LIVELY_M
             along = np.arange(-_LIVELY_M, last, rng.uniform(26.0, 33.0))
             feet = np.array([(*_place(axis, float(at), line), -KERB_M) for at in along])
             add_line(builder, rng, feet, "wood" if rng.random() < 0.6 else "concrete")
-        elif luck < 0.6:
+        elif luck < lines + 0.3:
             for along_m in np.arange(-_LIVELY_M, _LIVELY_M, rng.uniform(22.0, 30.0)).tolist():
                 if _off_crossings(along_m, others, 1.0) and not plan.is_built_over(axis, street, along_m):
                     _add_hung_lamp(builder, rng, plan, axis, street, along_m)

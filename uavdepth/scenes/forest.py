@@ -1,4 +1,4 @@
-"""The scene `forest`: many kinds of trees on flat ground, undergrowth, fallen logs, a trail, a clearing."""
+"""The scene `forest`: many kinds of trees, leafy or bare, undergrowth, fallen logs, a trail, a clearing."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from uavdepth.scenes.copies import Template, add_copies
 from uavdepth.scenes.description import SceneDescription
+from uavdepth.scenes.groves import add_tree_wall, tree_template
 from uavdepth.scenes.mesh import MeshBuilder
 from uavdepth.scenes.rocks import add_boulder
 from uavdepth.scenes.shapes import box_uv, grid_faces
 from uavdepth.scenes.terrain import LandNoise, Values, fractal_land, stretched_axis
 from uavdepth.scenes.undergrowth import add_bush, add_log, add_tuft
-from uavdepth.scenes.vegetation import TreeKind, add_far_tree, add_tree
+from uavdepth.scenes.vegetation import TreeKind, add_far_tree
 from uavdepth.scenes.weather import draw_weather
 
 _EXTENT_M = 68.0
@@ -74,6 +75,16 @@ _WOODS = (
     ),
     _Wood({"snowy_conifer": 0.75, "dead": 0.25}, ("snow", "snow", "snow"), 0.0, (4.4, 6.2)),
 )
+_WINTER_WOODS = (
+    _Wood(
+        {"bare": 0.8, "birch": 0.05, "conifer": 0.15},
+        ("leaf_litter", "leaf_litter", "moss"),
+        0.8,
+        (4.8, 6.6),
+    ),
+    _Wood({"bare": 0.75, "dead": 0.05, "snowy_conifer": 0.2}, ("snow", "snow", "snow"), 0.0, (4.6, 6.4)),
+)
+_WINTER_CHANCE = 0.16
 _WOOD_SHARES = (0.22, 0.2, 0.17, 0.14, 0.17, 0.1)
 
 
@@ -81,6 +92,9 @@ def build(seed: int) -> SceneDescription:
     """The forest of one seed."""
     rng = np.random.default_rng([seed, 0xF0E])
     wood = _WOODS[int(rng.choice(len(_WOODS), p=_WOOD_SHARES))]
+    winter = np.random.default_rng([seed, 0xB1E])
+    if winter.random() < _WINTER_CHANCE:
+        wood = _WINTER_WOODS[int(winter.integers(len(_WINTER_WOODS)))]
     wall_north_m = rng.uniform(34.0, 39.0)
     builder = MeshBuilder()
     _add_floor(builder, rng, wood)
@@ -88,7 +102,8 @@ def build(seed: int) -> SceneDescription:
     if rng.random() < 0.35:
         _add_rock_bank(builder, rng, wall_north_m)
     else:
-        _add_tree_wall(builder, rng, wood, wall_north_m)
+        kind: TreeKind = "snowy_conifer" if "snowy_conifer" in wood.kinds else "conifer"
+        add_tree_wall(builder, rng, kind, wood.autumn, wall_north_m, _WALL_HALF_WIDTH_M)
     _add_undergrowth(builder, rng, wood, wall_north_m)
     _add_far_trees(builder, rng, wood)
     weather = draw_weather(rng, (0.001, 0.009))
@@ -162,34 +177,10 @@ def _add_trees(builder: MeshBuilder, rng: np.random.Generator, wood: _Wood, wall
     variety = rng.integers(_VARIETIES, size=len(places))
     for number, kind in enumerate(kinds):
         for which in range(_VARIETIES):
-            template = _tree_template(rng, kind, float(rng.uniform(7.0, 14.0)), wood.autumn)
+            template = tree_template(rng, kind, float(rng.uniform(7.0, 14.0)), wood.autumn)
             here = (species == number) & (variety == which)
             here &= _is_free(places, template.reach * heights, wall_north_m)
             add_copies(builder, rng, template, _on_ground(places[here]), heights[here])
-
-
-def _tree_template(rng: np.random.Generator, kind: TreeKind, height_m: float, autumn: float) -> Template:
-    radius = height_m * rng.uniform(0.012, 0.03)
-    return Template.of(
-        lambda builder: add_tree(builder, rng, 0.0, 0.0, 0.0, height_m, kind, radius, autumn), height_m
-    )
-
-
-def _add_tree_wall(builder: MeshBuilder, rng: np.random.Generator, wood: _Wood, north_m: float) -> None:
-    """A stand too dense to fly through: bushes, a rank of young conifers, three ranks of tall ones."""
-    kind: TreeKind = "snowy_conifer" if "snowy_conifer" in wood.kinds else "conifer"
-    for rank, (low_m, high_m) in enumerate(((4.5, 7.5), (10.5, 15.0), (10.5, 15.0), (11.0, 16.0))):
-        east = np.arange(-_WALL_HALF_WIDTH_M, _WALL_HALF_WIDTH_M + 0.1, 1.5) + 0.75 * (rank % 2)
-        north = north_m + 1.6 * rank + rng.uniform(-0.4, 0.4, len(east))
-        places = np.column_stack([north, east + rng.uniform(-0.2, 0.2, len(east))])
-        heights = rng.uniform(low_m, high_m, len(east))
-        which = rng.integers(3, size=len(east))
-        for number in range(3):
-            template = _tree_template(rng, kind, 0.5 * (low_m + high_m), 0.0)
-            add_copies(builder, rng, template, _on_ground(places[which == number]), heights[which == number])
-    for east_m in np.arange(-_WALL_HALF_WIDTH_M, _WALL_HALF_WIDTH_M + 0.1, 1.1):
-        place = north_m - 0.4 + rng.uniform(-0.3, 0.5)
-        add_bush(builder, rng, place, east_m, 0.0, rng.uniform(1.6, 2.6), wood.autumn)
 
 
 def _add_rock_bank(builder: MeshBuilder, rng: np.random.Generator, north_m: float) -> None:

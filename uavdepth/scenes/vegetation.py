@@ -7,11 +7,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from uavdepth.scenes.bars import add_bars
 from uavdepth.scenes.mesh import MeshBuilder
 from uavdepth.scenes.shapes import box_uv, lumpy_sphere
 from uavdepth.scenes.tree_parts import ROOT_DEPTH_M, add_leaf_ball, add_trunk, add_tube, leaf_tint
 
-TreeKind = Literal["broadleaf", "poplar", "birch", "conifer", "snowy_conifer", "dead"]
+TreeKind = Literal["broadleaf", "poplar", "birch", "conifer", "snowy_conifer", "dead", "bare"]
 
 
 def add_tree(
@@ -33,7 +34,8 @@ def add_tree(
         north_m, east_m: foot of the trunk.
         ground_down_m: the ground there, NED down.
         height_m: from the ground to the top.
-        kind: what grows; "birch" is a slender broadleaf with white bark.
+        kind: what grows; "birch" is a slender broadleaf with white bark, "bare" a broadleaf in winter,
+            "dead" a snag.
         trunk_radius_m: at breast height; None takes one that suits the height.
         autumn: chance that the leaves are yellow to red, 0 to 1.
     """
@@ -44,6 +46,8 @@ def add_tree(
         _conifer(builder, rng, foot, height_m, radius, kind == "snowy_conifer")
     elif kind == "dead":
         _dead(builder, rng, foot, height_m, radius)
+    elif kind == "bare":
+        _bare(builder, rng, foot, height_m, radius)
     elif kind == "poplar":
         add_trunk(builder, rng, foot, 0.6 * height_m, radius, "bark", sway=0.02)
         middle = foot - [0.0, 0.0, 0.58 * height_m]
@@ -150,6 +154,35 @@ def _dead(
         )
 
 
+def _bare(
+    builder: MeshBuilder,
+    rng: np.random.Generator,
+    foot: NDArray[np.float64],
+    height_m: float,
+    radius_m: float,
+) -> None:
+    """Rising boughs, each with a fan of twigs: the crown of a broadleaf without leaves."""
+    line = add_trunk(builder, rng, foot, 0.78 * height_m, radius_m, "bark", sway=0.03)
+    boughs = 9
+    turn = rng.uniform(0.0, 2 * np.pi)
+    roots, tips = [], []
+    for bough in range(boughs):
+        part = 1.7 + 2.2 * bough / (boughs - 1)
+        start = line[int(part)] + (part % 1) * (line[min(int(part) + 1, 4)] - line[int(part)])
+        heading = turn + 2.4 * bough + rng.normal(0.0, 0.2)
+        out = np.array([np.cos(heading), np.sin(heading), 0.0])
+        reach, rise = height_m * rng.uniform(0.14, 0.24), height_m * rng.uniform(0.12, 0.24)
+        bend = start + 0.6 * reach * out - [0.0, 0.0, 0.4 * rise]
+        tip = start + reach * out - [0.0, 0.0, rise]
+        thick = radius_m * np.array([0.42, 0.28, 0.12])
+        add_tube(builder, np.array([start, bend, tip]), thick, 4, "bark", np.full(3, 0.9))
+        for root in np.linspace(bend, tip, 4):
+            twig = 0.5 * (tip - start) + reach * rng.normal(0.0, 0.5, 3) - [0.0, 0.0, 0.2 * rise]
+            roots.append(root)
+            tips.append(root + rng.uniform(0.5, 0.8) * twig)
+    add_bars(builder, roots, tips, 0.0028 * height_m, (0.8, 0.8, 0.8), "bark", sides=3)
+
+
 def add_far_tree(builder: MeshBuilder, rng: np.random.Generator, height_m: float, kind: TreeKind) -> None:
     """Grow a tree of few triangles at the origin, for where it is only seen from afar."""
     if kind in ("conifer", "snowy_conifer"):
@@ -161,7 +194,7 @@ def add_far_tree(builder: MeshBuilder, rng: np.random.Generator, height_m: float
             cone = np.vstack([ring, [0.0, 0.0, -min(low + 0.45, 1.0) * height_m]])
             faces = np.stack([np.arange(7), (np.arange(7) + 1) % 7, np.full(7, 7)], axis=1)
             builder.add(cone, faces, box_uv(cone, faces), crown, np.full(3, rng.uniform(0.7, 1.0)))
-    elif kind != "dead":
+    elif kind not in ("dead", "bare"):
         width, half = 0.24 * height_m, 0.36 * height_m
         vertices, faces = lumpy_sphere(rng, 1, (width, width, half), 0.2, 0.08)
         vertices = vertices - [0.0, 0.0, 0.62 * height_m]

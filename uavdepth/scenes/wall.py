@@ -6,8 +6,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from uavdepth.scenes.cars import CarPark
+from uavdepth.scenes.corridor import Corridor
 from uavdepth.scenes.description import SceneDescription
+from uavdepth.scenes.fences import FENCE_KINDS, add_fence
 from uavdepth.scenes.mesh import MeshBuilder
+from uavdepth.scenes.overhead import add_line, add_mast
+from uavdepth.scenes.people import Crowd
 from uavdepth.scenes.solids import Rect, add_box, add_slab
 from uavdepth.scenes.street_furniture import add_lamp, add_sign, add_small_thing
 from uavdepth.scenes.undergrowth import add_bush
@@ -43,6 +47,7 @@ def build(seed: int) -> SceneDescription:
         if rng.random() < 0.5:
             add_box(builder, (north_m - 0.15, float(east_m)), (0.3, 0.6), 0.0, height_m, "concrete", tint)
     _add_things(builder, rng, north_m)
+    _add_thin_things(builder, seed, north_m)
     weather = draw_weather(rng, (0.0005, 0.006))
     return weather.over(builder.build(), _flat, _HALF_M - 15.0)
 
@@ -97,3 +102,30 @@ def _add_things(builder: MeshBuilder, rng: np.random.Generator, wall_m: float) -
         else:
             add_bush(builder, rng, north, east, 0.0, rng.uniform(0.8, 2.0))
     cars.build(builder)
+
+
+def _add_thin_things(builder: MeshBuilder, seed: int, wall_m: float) -> None:
+    """A line of poles, fences, masts, a few people: from a random stream of their own."""
+    rng = np.random.default_rng([seed, 0x7419])
+    corridor = Corridor(wall_m)
+    if rng.random() < 0.5:
+        east = rng.choice([-1.0, 1.0]) * rng.uniform(15.0, 45.0)
+        norths = np.arange(-80.0, wall_m - 6.0, rng.uniform(20.0, 35.0))
+        feet = np.column_stack([norths, np.full_like(norths, east), 0.0 * norths])
+        add_line(builder, rng, feet, "wood" if rng.random() < 0.6 else "concrete")
+    for _ in range(int(rng.integers(0, 4))):
+        start = rng.uniform(-70.0, 70.0, 2)
+        turn = rng.integers(4) * 0.5 * np.pi + rng.normal(0.0, 0.1)
+        end = start + rng.uniform(8.0, 30.0) * np.array([np.cos(turn), np.sin(turn)])
+        if corridor.is_free((start[0], start[1]), (end[0], end[1])):
+            kind = FENCE_KINDS[int(rng.integers(len(FENCE_KINDS)))]
+            add_fence(builder, rng, [(*start, 0.0), (*end, 0.0)], kind)
+    crowd = Crowd(rng)
+    for _ in range(int(rng.integers(2, 9))):
+        place = rng.uniform(-60.0, 60.0, 2)
+        if corridor.is_free_around(place, 1.5)[0] and abs(place[0] - wall_m - 1.5) > 2.5:
+            if rng.random() < 0.4:
+                add_mast(builder, rng, place[0], place[1], 0.0)
+            else:
+                crowd.put(place[0], place[1], 0.0, rng.uniform(0, 2 * np.pi))
+    crowd.build(builder)
