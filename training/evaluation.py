@@ -14,6 +14,7 @@ from training.evaluation_frames import EvaluationFrame
 from training.evaluation_knowledge import Knowledge, vehicle_knowledge
 from training.evaluation_obstacles import SCAN_RANGE_M, ElementErrors, compare_scans
 from training.evaluation_sheet import SheetRow
+from training.evaluation_sky import SkyErrors, sky_errors
 from training.evaluation_sources import PERFECT, Answer, Sources
 from training.metrics import measurable, median_factor
 from uavdepth.scanner import ObstacleScanner
@@ -29,6 +30,7 @@ class SourceErrors:
         factor: truth over prediction, of the medians.
         unknown_share: pixels with a truth for which the source says nothing.
         doubt: sigma against errors; None for a source without sigma.
+        sky: what is said of the sky; None for a picture without sky, or without metres.
         elements: nearest obstacles; None where they were not looked for.
     """
 
@@ -37,6 +39,7 @@ class SourceErrors:
     factor: float
     unknown_share: float
     doubt: DoubtErrors | None
+    sky: SkyErrors | None
     elements: ElementErrors | None
 
 
@@ -69,9 +72,10 @@ def measure_frame(sources: Sources, item: EvaluationFrame) -> MeasuredFrame:
     """Run every source on a rendered frame and compare it with the truth, nearest obstacles included."""
     frame = item.frame
     knowledge = vehicle_knowledge(item, sources.point_counts)
-    answers = dict(sources.answers(frame.image_bgr, knowledge))
-    answers[PERFECT] = sources.perfect(frame.depth_m, frame.camera)
     scored = knowledge.without_points(frame.depth_m)
+    given = sources.answers(frame.image_bgr, knowledge)
+    answers = {label: answer.fitted(scored) for label, answer in given.items()}
+    answers[PERFECT] = sources.perfect(frame.depth_m, frame.camera)
     scanner = ObstacleScanner(frame.camera, frame.mount, max_distance_m=SCAN_RANGE_M)
     truth = scanner.scan(frame.depth_m, frame.attitude, frame.height_m)
     found: dict[str, SourceErrors] = {}
@@ -113,7 +117,8 @@ def compare(
         doubt = doubt_errors(truth_m, depth, answer.relative_sigma)
     there = measurable(truth_m, np.zeros_like(truth_m))
     unknown = float(np.mean(np.isnan(answer.depth_m[there])))
-    return SourceErrors(scaled, metric, factor, unknown, doubt, elements)
+    sky = sky_errors(truth_m, answer.depth_m, answer.relative_sigma) if answer.metric else None
+    return SourceErrors(scaled, metric, factor, unknown, doubt, sky, elements)
 
 
 def point_counts(knowledge: Knowledge) -> dict[int, int]:

@@ -73,8 +73,9 @@ def measure_kitti_frame(sources: Sources, frame: KittiFrame) -> MeasuredFrame:
         raise EvaluationError(f"{frame.name} has no LiDAR points or no calibration of the LiDAR")
     image = frame.drive.image_bgr(frame.index)
     knowledge = road_knowledge(frame, truth, sources.point_counts)
-    answers = sources.answers(image, knowledge)
     scored = np.where(garg_mask(*truth.shape), knowledge.without_points(truth), np.float32(np.nan))
+    given = sources.answers(image, knowledge)
+    answers = {label: answer.fitted(scored) for label, answer in given.items()}
     compared = {label: compare(scored, answer) for label, answer in answers.items()}
     found = {label: errors for label, errors in compared.items() if errors is not None}
     errors = FrameErrors(frame.drive.name, frame.name, point_counts(knowledge), found)

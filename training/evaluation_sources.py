@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from training.baselines import constant_depth, flat_ground_depth, nearest_point_depth
+from training.evaluation_affine import fit_to_points, fit_to_truth
 from training.evaluation_knowledge import HintMode, Knowledge, hint_modes, points_ratio
 from uavdepth.camera import CameraModel
 from uavdepth.depth_model import DepthModel
 from uavdepth.ground_scale import GroundScaler
+from uavdepth.hints import PointHints
 
 CONSTANT = "constant depth"
 FLAT_GROUND = "flat ground"
@@ -52,11 +54,20 @@ class Answer:
         depth_m: (H, W) float32 z-depth in metres, NaN where unknown.
         relative_sigma: (H, W) float32 its doubt, or None.
         metric: whether its metres mean anything.
+        affine_inverse_depth: (H, W) float32 where scale and shift are still to be found, as in `DepthMap`.
     """
 
     depth_m: NDArray[np.float32]
     relative_sigma: NDArray[np.float32] | None = None
     metric: bool = True
+    affine_inverse_depth: NDArray[np.float32] | None = None
+
+    def fitted(self, truth_m: NDArray[np.float32]) -> Answer:
+        """The same, with scale and shift fitted to the truth where they are still to be found."""
+        if self.affine_inverse_depth is None:
+            return self
+        depth_m = fit_to_truth(self.affine_inverse_depth, truth_m)
+        return Answer(self.depth_m if depth_m is None else depth_m, metric=False)
 
 
 class Sources:
@@ -119,7 +130,7 @@ class Sources:
 
     def _infer(self, image_bgr: NDArray[np.uint8], knowledge: Knowledge, mode: HintMode) -> Answer:
         found = self.model.infer(image_bgr, knowledge.camera, knowledge.hints(mode))
-        return Answer(found.depth_m, found.relative_sigma, self.model.card.metric)
+        return Answer(found.depth_m, found.relative_sigma, self.model.card.metric, found.affine_inverse_depth)
 
     def _scaled(self, plain: Answer, knowledge: Knowledge) -> dict[str, Answer]:
         """What is done for a network that takes no hints: one factor from the ground, or from points."""
@@ -133,10 +144,18 @@ class Sources:
                 scaled[THERE] = plain
         if "points" not in self.takes:
             for count, points in knowledge.points.items():
-                factor = points_ratio(points, knowledge.camera, plain.depth_m)
-                if factor is not None:
-                    scaled[points_scaled(count)] = _times(plain, factor)
+                answer = _scaled_by_points(plain, points, knowledge.camera)
+                if answer is not None:
+                    scaled[points_scaled(count)] = answer
         return scaled
+
+
+def _scaled_by_points(plain: Answer, points: PointHints, camera: CameraModel) -> Answer | None:
+    if plain.affine_inverse_depth is not None:
+        depth_m = fit_to_points(plain.affine_inverse_depth, points, camera)
+        return None if depth_m is None else Answer(depth_m)
+    factor = points_ratio(points, camera, plain.depth_m)
+    return None if factor is None else _times(plain, factor)
 
 
 def _times(answer: Answer, factor: float) -> Answer:

@@ -12,6 +12,7 @@ from training.evaluation import FrameErrors, SourceErrors
 from training.evaluation_bands import BAND_EDGES_M, mean_of_bands
 from training.evaluation_doubt import LAPLACE_COVERAGE, NOMINAL_COVERAGE, SIGMAS, DoubtErrors, pooled
 from training.evaluation_obstacles import ElementErrors, all_elements
+from training.evaluation_sky import SkyErrors
 from training.metrics import DepthMetrics
 
 _DIGITS = 4
@@ -108,13 +109,25 @@ class SourceSummary:
         )
 
     @property
+    def sky(self) -> SkyErrors | None:
+        """What is said of the sky, on the mean of the pictures that show some."""
+        found = [item.sky for item in self.errors if item.sky is not None]
+        if not found:
+            return None
+        return SkyErrors(
+            float(np.mean([item.far_share for item in found])),
+            _mean([item.sigma for item in found]),
+            _mean([item.sigma_elsewhere for item in found]),
+        )
+
+    @property
     def elements(self) -> ElementErrors | None:
         """Nearest obstacles of all frames."""
         return all_elements([item.elements for item in self.errors if item.elements is not None])
 
     def as_json(self) -> dict[str, Any]:
         """Everything as plain values."""
-        doubt, elements = self.doubt, self.elements
+        doubt, elements, sky = self.doubt, self.elements, self.sky
         factors = [item.factor for item in self.errors]
         return {
             "frames": self.frames,
@@ -138,6 +151,7 @@ class SourceSummary:
                 )
             ],
             "sigma": None if doubt is None else doubt.as_json(),
+            "sky": None if sky is None else _sky_json(sky),
             "nearest_obstacle": None if elements is None else elements_json(elements),
         }
 
@@ -171,6 +185,19 @@ def elements_json(elements: ElementErrors) -> dict[str, Any]:
         "free_elements": elements.free,
         **{key: None if value is None else _round(value) for key, value in shares.items()},
     }
+
+
+def _sky_json(sky: SkyErrors) -> dict[str, float | None]:
+    return {
+        "far_share": _round(sky.far_share),
+        "median_sigma": None if sky.sigma is None else _round(sky.sigma),
+        "median_sigma_elsewhere": None if sky.sigma_elsewhere is None else _round(sky.sigma_elsewhere),
+    }
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else None
 
 
 def _sharpness(everything: float, surest: float, correlation: float) -> dict[str, float]:

@@ -11,6 +11,7 @@ from training.evaluation_bands import band_names
 from training.evaluation_doubt import NOMINAL_COVERAGE, SIGMAS
 from training.evaluation_obstacles import FALSE_ALARM_M, MEASURED_M
 from training.evaluation_report import EvaluationReport, mean_points
+from training.evaluation_sky import FAR_M, SkyErrors
 from training.evaluation_sources import PERFECT, THERE, is_rescaled
 from training.evaluation_summary import SourceSummary
 from training.metrics import DepthMetrics
@@ -85,10 +86,13 @@ def _bands(title: str, rows: Sequence[SourceSummary]) -> Table:
 
 def _doubt(title: str, rows: Sequence[SourceSummary]) -> Table:
     within = [f"<{sigma:g} sigma" for sigma in SIGMAS]
+    sky = f"sky >{FAR_M:g} m"
     table = _table(
-        title, ("depth from",), (*within, "Abs Rel", "surest half", "share", "of all pixels", "rank corr.")
+        title,
+        ("depth from",),
+        (*within, "Abs Rel", "surest half", "share", "pooled", "rank corr.", sky, "sigma there", "elsewhere"),
     )
-    table.add_row("Gaussian errors", *(f"{share:.2f}" for share in NOMINAL_COVERAGE), *["-"] * 5)
+    table.add_row("Gaussian errors", *(f"{share:.2f}" for share in NOMINAL_COVERAGE), *["-"] * 8)
     table.add_section()
     for row in rows:
         doubt = row.doubt
@@ -102,8 +106,16 @@ def _doubt(title: str, rows: Sequence[SourceSummary]) -> Table:
                 _number(doubt.surest_abs_rel, doubt.all_abs_rel),
                 _number(together.surest_abs_rel, together.all_abs_rel),
                 f"{doubt.rank_correlation:.2f}",
+                *_sky(row.sky),
             )
     return table
+
+
+def _sky(sky: SkyErrors | None) -> list[str]:
+    if sky is None:
+        return ["-"] * 3
+    sigmas = ("-" if sigma is None else f"{sigma:.2f}" for sigma in (sky.sigma, sky.sigma_elsewhere))
+    return [_percent(sky.far_share), *sigmas]
 
 
 def _elements(title: str, rows: Sequence[SourceSummary]) -> Table:
