@@ -3,24 +3,36 @@
 from __future__ import annotations
 
 import json
+import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import onnx
 import pytest
 import torch
 from frames import make_store
 
+import training.export
 from training.checkpoint import Checkpoint
 from training.commands import export
 from training.data.batches import FramePool, network_image
-from training.errors import CheckpointError, EvaluationError
+from training.data.hint_sampling import hint_maps
+from training.data.views import View
+from training.errors import CheckpointError, EvaluationError, ExportError
 from training.export import export_checkpoint
+from training.half_weights import SMALLEST_HALVED, rounded_network
 from training.networks.depth_network import NetworkShape
 from training.normalization import MAX_DEPTH_M, depth_from_output
 from training.settings import SizePhase, TrainingSettings
 from training.trainer import Trainer
-from uavdepth.camera import CameraModel
+from uavdepth.attitude import Attitude
+from uavdepth.camera import CameraModel, CameraMount
 from uavdepth.depth_model import DepthModel
+from uavdepth.hints import GroundHint, Hints, PointHints
+
+SIZE = (128, 64)
+"""Another than that of the run: every size comes from one checkpoint."""
 
 
 @pytest.fixture(scope="module")
@@ -47,31 +59,103 @@ def checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Checkpoint:
 @pytest.fixture(scope="module")
 def exported(checkpoint: Checkpoint, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("export") / "network.onnx"
-    export_checkpoint(checkpoint, path, "narrow", {"median_scaled": {"abs_rel": 0.25}})
+    export_checkpoint(checkpoint, path, "narrow", {"median_scaled": {"abs_rel": 0.25}}, SIZE)
     return path
 
 
 def test_the_card_says_what_the_file_is(checkpoint: Checkpoint, exported: Path) -> None:
     card = DepthModel.load(exported, provider="cpu").card
-    assert (card.name, card.input_width, card.input_height) == ("narrow", 96, 64)
+    assert (card.name, card.input_width, card.input_height) == ("narrow", *SIZE)
+    assert (card.card_version, card.hints) == (2, ("ground", "points"))
     assert (card.output, card.metric, card.uncertainty) == ("log_inverse_depth", True, True)
     assert card.max_depth_m == MAX_DEPTH_M
     assert card.measured == {"median_scaled": {"abs_rel": 0.25}}
     assert f"{checkpoint.images} pictures" in card.training_data
 
 
-def test_flight_gives_the_depth_that_training_meant(checkpoint: Checkpoint, exported: Path) -> None:
-    camera = CameraModel.from_fov(96, 64, 75.0)
-    picture = np.random.default_rng(1).integers(0, 256, (64, 96, 3), dtype=np.uint8)
+def some_hints(camera: CameraModel) -> Hints:
+    rng = np.random.default_rng(2)
+    pixels = rng.uniform((0, 0), (camera.width - 1, camera.height - 1), (40, 2))
+    points = PointHints(pixels, rng.uniform(2.0, 30.0, 40), rng.uniform(0.02, 0.2, 40))
+    return Hints(GroundHint(CameraMount(pitch_deg=-10.0), Attitude(0.1, 0.0, 0.0), 4.0), points)
+
+
+@pytest.mark.parametrize("hinted", [False, True])
+def test_flight_gives_the_depth_that_training_meant(
+    checkpoint: Checkpoint, exported: Path, hinted: bool
+) -> None:
+    camera = CameraModel.from_fov(*SIZE, 75.0)
+    hints = some_hints(camera) if hinted else Hints()
+    picture = np.random.default_rng(1).integers(0, 256, (SIZE[1], SIZE[0], 3), dtype=np.uint8)
+    view = View(camera, CameraMount(), Attitude(0.0, 0.0, 0.0))
+    planes = (network_image(picture), *hint_maps(hints, view, *SIZE))
     with torch.no_grad():
-        output = checkpoint.averaged_network()(torch.from_numpy(network_image(picture))[None])
+        output = checkpoint.averaged_network()(*(torch.from_numpy(plane)[None] for plane in planes))
     wanted = depth_from_output(output.log_inverse_depth[0, 0].numpy(), camera.fx)
-    answer = DepthModel.load(exported, provider="cpu").infer(picture, camera)
-    known = np.isfinite(answer.depth_m)
+    answer = DepthModel.load(exported, provider="cpu").infer(picture, camera, hints)
+    known = np.isfinite(answer.depth_m) & (wanted < MAX_DEPTH_M)
     assert known.any()
-    assert np.allclose(answer.depth_m[known], wanted[known], rtol=2e-3)
+    # The checkpoint is in single precision, the file in half.
+    assert np.abs(np.log(answer.depth_m[known] / wanted[known])).mean() < 2e-3
     assert answer.relative_sigma is not None
-    assert np.allclose(answer.relative_sigma[known], np.exp(output.log_sigma[0, 0].numpy())[known], rtol=2e-3)
+    sigma = np.exp(output.log_sigma[0, 0].numpy())
+    assert np.allclose(answer.relative_sigma[known], sigma[known], rtol=1e-2)
+
+
+def test_large_weights_are_stored_in_half_precision_and_small_ones_are_not(exported: Path) -> None:
+    stored = {item.name: item for item in onnx.load(exported).graph.initializer}
+    sizes = {name: math.prod(item.dims) for name, item in stored.items()}
+    halved = {name for name, item in stored.items() if item.data_type == onnx.TensorProto.FLOAT16}
+    assert halved == {
+        name
+        for name, item in stored.items()
+        if sizes[name] >= SMALLEST_HALVED and item.data_type != onnx.TensorProto.INT64
+    }
+    assert sum(sizes[name] for name in halved) > 0.7 * sum(sizes.values())
+
+
+def test_the_rounded_network_leaves_the_trained_one_as_it_is(checkpoint: Checkpoint) -> None:
+    network = checkpoint.averaged_network()
+    before = {name: value.clone() for name, value in network.state_dict().items()}
+    rounded = rounded_network(network)
+    assert all(torch.equal(before[name], value) for name, value in network.state_dict().items())
+    for parameter in rounded.parameters():
+        if parameter.numel() >= SMALLEST_HALVED:
+            assert torch.equal(parameter, parameter.half().float())
+
+
+def test_a_weight_that_half_precision_cannot_hold_is_named(checkpoint: Checkpoint) -> None:
+    network = checkpoint.averaged_network()
+    name, large = next(item for item in network.named_parameters() if item[1].numel() >= SMALLEST_HALVED)
+    with torch.no_grad():
+        large.view(-1)[0] = 1e6
+    with pytest.raises(ExportError, match=f"{name} reaches 1e\\+06"):
+        rounded_network(network)
+
+
+@pytest.mark.parametrize("size", [(100, 64), (96, 33), (32, 64)])
+def test_a_size_that_the_network_cannot_take_is_refused(
+    checkpoint: Checkpoint, tmp_path: Path, size: tuple[int, int]
+) -> None:
+    with pytest.raises(ExportError, match=f"{size[0]}x{size[1]}"):
+        export_checkpoint(checkpoint, tmp_path / "out.onnx", "narrow", size=size)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_computes_something_else_does_not_take_its_place(
+    checkpoint: Checkpoint, exported: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wrong = onnx.load(exported)
+    (bias,) = [item for item in wrong.graph.initializer if item.name.endswith("correction.output.bias")]
+    bias.CopyFrom(
+        onnx.numpy_helper.from_array(onnx.numpy_helper.to_array(bias) + np.float32(0.01), bias.name)
+    )
+    monkeypatch.setattr(training.export, "_to_onnx", lambda network, card: wrong)
+    (tmp_path / "out.onnx").write_bytes(b"the old one")
+    with pytest.raises(ExportError, match="differs from PyTorch's"):
+        export_checkpoint(checkpoint, tmp_path / "out.onnx", "narrow", size=SIZE)
+    assert (tmp_path / "out.onnx").read_bytes() == b"the old one"
+    assert len(list(tmp_path.iterdir())) == 1
 
 
 def test_nothing_of_the_training_machine_is_in_the_file(exported: Path) -> None:
@@ -80,7 +164,13 @@ def test_nothing_of_the_training_machine_is_in_the_file(exported: Path) -> None:
         assert trace not in content
 
 
-def test_the_command_writes_measured_errors_into_the_card(checkpoint: Checkpoint, tmp_path: Path) -> None:
+def test_the_command_writes_measured_errors_into_the_card(
+    checkpoint: Checkpoint, exported: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Tracing the graph takes most of an export's time, and it is the same again.
+    monkeypatch.setattr(training.export, "_to_onnx", lambda network, card: onnx.load(exported))
+    settings = replace(checkpoint.settings, phases=(SizePhase(1.0, *SIZE, 2),))
+    checkpoint = replace(checkpoint, settings=settings)
     checkpoint.save(tmp_path / "checkpoint.pt")
     (tmp_path / "errors.json").write_text(json.dumps({"summary": {"frames": 7}}))
     export(
