@@ -7,17 +7,13 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Any
 
 import torch
 import torch.nn.functional as F  # noqa: N812 (torch's own convention)
 from torch import Tensor
-from torch.autograd.function import once_differentiable
 
 from training.errors import PhotometricShapeError
-
-MIN_DEPTH_RATIO = 1e-3
-"""A point is in front of the source camera if its depth there exceeds this part of that in the target."""
+from training.photometric.constants import MIN_DEPTH_RATIO
 
 _SMALL_ANGLE_SQUARED = 1e-3
 
@@ -104,7 +100,7 @@ def reproject(source: Tensor, depth: Tensor, intrinsics: Tensor, source_from_tar
 
     Returns:
         The source frame sampled bilinearly at p2, (N, 3, H, W). Outside of the source frame its border is
-        repeated; a point behind the source camera shows the picture's centre. Neither has a gradient.
+        repeated; a point behind the source camera shows its upper left pixel. Neither has a gradient.
 
     Raises:
         PhotometricShapeError: shapes that do not belong together.
@@ -115,95 +111,39 @@ def reproject(source: Tensor, depth: Tensor, intrinsics: Tensor, source_from_tar
         raise PhotometricShapeError(f"depth has the shape {tuple(depth.shape)}: {expected} is needed")
     depth = _at_least_single(depth)
     with torch.autocast(depth.device.type, enabled=False):
-        motion = PixelMotion(intrinsics, source_from_target, source.shape[-2], source.shape[-1])
-        return motion.sample(source, depth.reciprocal())
+        return warp(source, depth.reciprocal(), pixel_motion(intrinsics, source_from_target))
 
 
-class PixelMotion:
-    """The motion between two cameras, ready to place the target's pixels for any depth.
+def pixel_motion(intrinsics: Tensor, source_from_target: Tensor) -> Tensor:
+    """(N, 3, 4) of how pixels move: K R K^-1 and K T side by side.
 
-    Divided by Z1, equation 4 is linear in inverse depth q: (Z2 / Z1) p2 = (K R K^-1) p1 + q K T. The first
-    part is the same for all scales and is computed once.
-
-    Args:
-        intrinsics: (N, 3, 3) in pixels.
-        source_from_target: (N, 4, 4).
-        height, width: of the pictures in pixels.
+    Divided by Z1, equation 4 is linear in inverse depth q: (Z2 / Z1) p2 = (K R K^-1) p1 + q K T.
     """
-
-    def __init__(self, intrinsics: Tensor, source_from_target: Tensor, height: int, width: int) -> None:
-        transform = _at_least_single(source_from_target)
-        camera = intrinsics.to(transform.dtype)
-        # grid_sample with align_corners=False takes -1 and 1 for the outer edges of the first and last pixel,
-        # which are at -1/2 and W - 1/2 here: x becomes (2 x + 1) / W - 1.
-        grid_from_pixel = camera.new_tensor(
-            [[2.0 / width, 0.0, 1.0 / width - 1.0], [0.0, 2.0 / height, 1.0 / height - 1.0], [0.0, 0.0, 1.0]]
-        )
-        grid_from_camera = grid_from_pixel @ camera
-        at_infinity = grid_from_camera @ transform[:, :3, :3] @ torch.linalg.inv(camera)
-        self._motion = torch.cat((at_infinity, grid_from_camera @ transform[:, :3, 3:]), dim=2)
-        self._pixels = pixel_grid(height, width, transform.dtype, transform.device)
-        self._at_infinity = (at_infinity.detach() @ self._pixels).view(-1, 3, height, width)
-
-    def sample(self, source: Tensor, inverse_depth: Tensor) -> Tensor:
-        """The source (N, C, H, W) seen from the target, whose inverse depth is (N, 1, H, W)."""
-        rebuilt: Tensor = F.grid_sample(
-            source.to(inverse_depth.dtype),
-            self.grid(inverse_depth),
-            mode="bilinear",
-            padding_mode="border",
-            align_corners=False,
-        )
-        return rebuilt
-
-    def grid(self, inverse_depth: Tensor) -> Tensor:
-        """(N, H, W, 2) coordinates for grid_sample with align_corners=False; 0, 0 for a point behind."""
-        inverse_depth = inverse_depth.to(self._motion.dtype)
-        grid: Tensor = _Grid.apply(inverse_depth, self._motion, self._at_infinity, self._pixels)  # type: ignore[no-untyped-call]
-        return grid
+    transform = _at_least_single(source_from_target)
+    camera = intrinsics.to(transform.dtype)
+    at_infinity = camera @ transform[:, :3, :3] @ torch.linalg.inv(camera)
+    return torch.cat((at_infinity, camera @ transform[:, :3, 3:]), dim=2)
 
 
-class _Grid(torch.autograd.Function):
-    """Across (a0 + q b0) / (a2 + q b2), down (a1 + q b1) / (a2 + q b2), for motion [A | b] and a = A p.
+def warp(source: Tensor, inverse_depth: Tensor, motion: Tensor) -> Tensor:
+    """The source (N, C, H, W) sampled where `motion` takes the pixels of inverse depth (N, 1, H, W).
 
-    By hand, because autograd would write a picture-sized gradient of `a` only to sum it up into A's.
+    Outside of the source its border is repeated; a point behind its camera shows its upper left pixel. No
+    gradient comes from either.
     """
-
-    @staticmethod
-    def forward(
-        ctx: Any, inverse_depth: Tensor, motion: Tensor, at_infinity: Tensor, pixels: Tensor
-    ) -> Tensor:
-        count, _, height, width = inverse_depth.shape
-        shift = motion[:, :, 3:, None]
-        ratio = torch.addcmul(at_infinity[:, 2:], inverse_depth, shift[:, 2:])
-        # What is not in front gets the factor 1 / inf = 0, and with it no gradient.
-        factor = F.threshold(ratio, MIN_DEPTH_RATIO, math.inf).reciprocal_()
-        grid = inverse_depth.new_empty((count, height, width, 2))
-        for axis in (0, 1):
-            place = torch.addcmul(at_infinity[:, axis : axis + 1], inverse_depth, shift[:, axis : axis + 1])
-            torch.mul(place[:, 0], factor[:, 0], out=grid[..., axis])
-        ctx.save_for_backward(inverse_depth, motion, factor, grid)
-        ctx.pixels = pixels
-        return grid
-
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, by_grid: Tensor) -> tuple[Tensor | None, Tensor | None, None, None]:
-        inverse_depth, motion, factor, grid = ctx.saved_tensors
-        count, _, height, width = inverse_depth.shape
-        by_point = inverse_depth.new_empty((count, 3, height, width))
-        torch.mul(by_grid[..., 0], factor[:, 0], out=by_point[:, 0])
-        torch.mul(by_grid[..., 1], factor[:, 0], out=by_point[:, 1])
-        torch.mul(by_point[:, 0], grid[..., 0], out=by_point[:, 2])
-        by_point[:, 2].addcmul_(by_point[:, 1], grid[..., 1]).neg_()
-        by_point = by_point.flatten(2)
-        by_inverse_depth = by_motion = None
-        if ctx.needs_input_grad[0]:
-            by_inverse_depth = (motion[:, :, 3:].transpose(1, 2) @ by_point).view_as(inverse_depth)
-        if ctx.needs_input_grad[1]:
-            by_shift = by_point @ inverse_depth.flatten(2).transpose(1, 2)
-            by_motion = torch.cat((by_point @ ctx.pixels.T, by_shift), dim=2)
-        return by_inverse_depth, by_motion, None, None
+    height, width = source.shape[-2:]
+    pixels = pixel_grid(height, width, motion.dtype, motion.device)
+    points = (motion[:, :, :3] @ pixels).view(-1, 3, height, width) + motion[:, :, 3:, None] * inverse_depth
+    # What is not in front gets the factor 1 / inf = 0, and with it no gradient.
+    factor = F.threshold(points[:, 2:], MIN_DEPTH_RATIO, math.inf).reciprocal()
+    place = (points[:, :2] * factor).permute(0, 2, 3, 1)
+    # With align_corners=False, -1 and 1 are the outer edges of the first and last pixel, here at -1/2 and
+    # W - 1/2.
+    grid = (2.0 * place + 1.0) / motion.new_tensor([width, height]) - 1.0
+    rebuilt: Tensor = F.grid_sample(
+        source.to(grid.dtype), grid, mode="bilinear", padding_mode="border", align_corners=False
+    )
+    return rebuilt
 
 
 @lru_cache(maxsize=16)

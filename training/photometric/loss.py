@@ -10,8 +10,8 @@ import torch.nn.functional as F  # noqa: N812 (torch's own convention)
 from torch import Tensor
 
 from training.errors import PhotometricSettingsError, PhotometricShapeError
-from training.photometric.appearance import Target, explained_error, unwarped_error
-from training.photometric.geometry import PixelMotion, check_pair
+from training.photometric.explanation import explained_error, unwarped_error
+from training.photometric.geometry import check_pair, pixel_motion
 from training.photometric.smoothness import smoothness
 from training.photometric.upsampling import upsample
 
@@ -94,28 +94,24 @@ def photometric_loss(
     _check_shapes(disparities, target, sources, intrinsics, source_from_target)
     height, width = target.shape[-2:]
     with torch.autocast(target.device.type, enabled=False):
-        target = target.float()
-        sources = [source.float() for source in sources]
-        reference = Target.of(target)
-        motions = [PixelMotion(intrinsics, transform, height, width) for transform in source_from_target]
+        target = target.detach().float().contiguous()
+        neighbours = torch.stack([source.detach().float() for source in sources]).contiguous()
+        motion = torch.stack([pixel_motion(intrinsics.float(), each) for each in source_from_target])
         unwarped = None
         if settings.auto_mask:
-            unwarped = unwarped_error(sources, reference, settings.alpha, settings.minimum) - TIE
+            unwarped = unwarped_error(target, neighbours, settings.alpha, settings.minimum) - TIE
         nearest, farthest = 1.0 / settings.min_depth_m, 1.0 / settings.max_depth_m
         reprojection, smooth = target.new_zeros(()), target.new_zeros(())
         masks = []
         picture = target
         for scale, output in enumerate(disparities):
             disparity = output.float()
+            picture = picture if scale == 0 else F.avg_pool2d(picture, 2)
             smooth = smooth + smoothness(disparity, picture) / 2**scale
-            picture = F.avg_pool2d(picture, 2)
-            if scale > 0:
-                disparity = upsample(disparity, height, width)
-            inverse_depth = farthest + (nearest - farthest) * disparity
-            rebuilt = [
-                motion.sample(source, inverse_depth) for motion, source in zip(motions, sources, strict=True)
-            ]
-            error, mask = explained_error(rebuilt, reference, unwarped, settings.alpha, settings.minimum)
+            inverse_depth = farthest + (nearest - farthest) * upsample(disparity, height, width)
+            error, mask = explained_error(
+                target, neighbours, inverse_depth, motion, unwarped, settings.alpha, settings.minimum
+            )
             reprojection = reprojection + error
             masks.append(mask)
         reprojection = reprojection / len(disparities)
