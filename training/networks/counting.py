@@ -14,7 +14,7 @@ import torch
 from torch import Tensor, nn
 from torch.utils.flop_counter import FlopCounterMode
 
-from training.networks.catalogue import NETWORK_NAMES, RESNET18, build_network
+from training.networks.catalogue import EFFICIENTNET_LITE0, NETWORK_NAMES, RESNET18, build_network
 from training.networks.depth_network import DepthNetwork
 from training.networks.pose_network import PoseNetwork
 
@@ -79,11 +79,13 @@ def count_multiply_adds(network: nn.Module, *inputs: Tensor) -> int:
 
 def count_networks() -> list[NetworkCost]:
     """Every network of the catalogue, the pose network and the one that flies."""
-    costs = []
-    for name in NETWORK_NAMES:
-        costs.append(_cost(name, RESNET18, build_network(name), _picture))
-    costs.append(_cost(POSE, None, PoseNetwork(), lambda w, h: _picture(w, h) * 2))
-    costs.append(_cost(FLIGHT, "efficientnet-lite0", DepthNetwork(), _picture_with_hints))
+    # Weights are neither needed nor made.
+    with torch.device("meta"):
+        catalogue = {name: build_network(name) for name in NETWORK_NAMES}
+        pose, flight = PoseNetwork(), DepthNetwork()
+    costs = [_cost(name, RESNET18, network, _picture) for name, network in catalogue.items()]
+    costs.append(_cost(POSE, None, pose, lambda width, height: _picture(width, height) * 2))
+    costs.append(_cost(FLIGHT, EFFICIENTNET_LITE0, flight, _picture_with_hints))
     return costs
 
 

@@ -22,6 +22,9 @@ RESNET18_CHANNELS = (64, 64, 128, 256, 512)
 _CLASSIFIER = "fc."
 _COUNTER = "num_batches_tracked"
 
+_READ_ERRORS = (RuntimeError, EOFError, ValueError, KeyError, AttributeError, TypeError)
+"""Whatever else PyTorch raises for a file that is something else."""
+
 
 class BasicBlock(nn.Module):
     """Two 3x3 convolutions around a shortcut, which is a 1x1 convolution where size or width change."""
@@ -103,7 +106,10 @@ def _read_state(path: Path) -> Mapping[str, Tensor]:
         state = torch.load(path, map_location="cpu", weights_only=True)
     except OSError as error:
         raise PretrainedWeightsError(f"cannot read the encoder weights {path}: {error.strerror}") from error
-    except (pickle.UnpicklingError, RuntimeError, EOFError, ValueError) as error:
+    except pickle.UnpicklingError as error:
+        # PyTorch's own text advises to load the file without its protection.
+        raise PretrainedWeightsError(f"{path} is not a file of weights") from error
+    except _READ_ERRORS as error:
         raise PretrainedWeightsError(f"{path} is not a file of weights: {error}") from error
     if not isinstance(state, Mapping) or not all(isinstance(value, Tensor) for value in state.values()):
         raise PretrainedWeightsError(f"{path} is not a state dict: names with tensors are needed")
