@@ -46,7 +46,8 @@ def add_house(
             _add_balconies(builder, rng, start, end, floors, ground_m)
     _add_cornice(builder, plot, top_m, tint)
     if floors <= 5 and rng.random() < _GABLE_CHANCE:
-        _add_gable(builder, rng, plot, top_m, _BLIND[style], tint)
+        ridge_m = add_gable(builder, rng, plot, top_m, _BLIND[style], tint)
+        add_chimney(builder, rng, plot, top_m, ridge_m)
     else:
         _add_flat_roof(builder, rng, plot, top_m, _BLIND[style], tint)
 
@@ -99,9 +100,31 @@ def _add_flat_roof(
         add_box(builder, (north, east), size, top_m, top_m + rng.uniform(1.0, 2.8), texture)
 
 
-def _add_gable(
-    builder: MeshBuilder, rng: np.random.Generator, plot: Rect, top_m: float, blind: str, tint: np.ndarray
-) -> None:
+def add_gable(
+    builder: MeshBuilder,
+    rng: np.random.Generator,
+    plot: Rect,
+    top_m: float,
+    blind: str,
+    tint: np.ndarray,
+    roof: str = "roof_tiles",
+    eaves_m: float = 0.0,
+) -> float:
+    """A roof of two slopes with gables.
+
+    Args:
+        builder: the scene's mesh.
+        rng: source of its pitch and colour.
+        plot: the house's foot, metres.
+        top_m: height of its walls over down = 0.
+        blind: texture of the gables.
+        tint: BGR factor of the gables.
+        roof: texture of the slopes.
+        eaves_m: how far the slopes reach over the walls.
+
+    Returns:
+        Height of the ridge over down = 0.
+    """
     deep = plot.north_high_m - plot.north_low_m
     wide = plot.east_high_m - plot.east_low_m
     ridge_m = top_m + 0.5 * min(deep, wide) * rng.uniform(0.6, 1.0)
@@ -115,11 +138,13 @@ def _add_gable(
         first, last = (plot.north_low_m, middle), (plot.north_high_m, middle)
         slopes, gables = [(b, c, last, first), (d, a, first, last)], [(a, b, first), (c, d, last)]
     roof_tint = rng.uniform(0.7, 1.1)
-    for low_a, low_b, high_b, high_a in slopes:
+    for corners in slopes:
+        (low_a, low_b, high_b, high_a), drop_m = _overhanging(corners, eaves_m, ridge_m - top_m)
         length = float(np.hypot(low_b[0] - low_a[0], low_b[1] - low_a[1]))
         run = float(np.hypot(high_a[0] - low_a[0], high_a[1] - low_a[1]))
-        slope = float(np.hypot(run, ridge_m - top_m))
-        vertices = [(*low_a, -top_m), (*low_b, -top_m), (*high_b, -ridge_m), (*high_a, -ridge_m)]
+        slope = float(np.hypot(run, ridge_m - top_m + drop_m))
+        foot_m = top_m - drop_m
+        vertices = [(*low_a, -foot_m), (*low_b, -foot_m), (*high_b, -ridge_m), (*high_a, -ridge_m)]
         uv = [(0.0, slope), (length, slope), (length, 0.0), (0.0, 0.0)]
         builder.add(vertices, [(0, 1, 2), (0, 2, 3)], uv, "roof_tiles", np.full(3, roof_tint))
     for left, right, peak in gables:
@@ -127,8 +152,27 @@ def _add_gable(
         rise = ridge_m - top_m
         vertices = [(*left, -top_m), (*right, -top_m), (*peak, -ridge_m)]
         builder.add(vertices, [(0, 1, 2)], [(0.0, rise), (width, rise), (width / 2, 0.0)], blind, tint)
+    return ridge_m
+
+
+def add_chimney(
+    builder: MeshBuilder, rng: np.random.Generator, plot: Rect, top_m: float, ridge_m: float
+) -> None:
+    """A chimney somewhere on a roof, a little higher than its ridge."""
     place = (
         rng.uniform(plot.north_low_m + 2, plot.north_high_m - 2),
         rng.uniform(plot.east_low_m + 2, plot.east_high_m - 2),
     )
     add_box(builder, place, (0.8, 0.6), top_m, ridge_m + 0.9, "brick")
+
+
+def _overhanging(
+    corners: tuple[Point, Point, Point, Point], eaves_m: float, rise_m: float
+) -> tuple[list[Point], float]:
+    """A slope's corners (two low, two high) drawn out over the walls, and how far its foot drops."""
+    low_a, low_b, high_b, high_a = np.array(corners, float)
+    along, down = low_b - low_a, low_a - high_a
+    run = float(np.linalg.norm(down))
+    along, down = along / np.linalg.norm(along) * eaves_m, down / run * eaves_m
+    spread = (low_a - along + down, low_b + along + down, high_b + along, high_a - along)
+    return [(float(north), float(east)) for north, east in spread], eaves_m * rise_m / run
