@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from training.data.frame_store import FrameRecord, NewFrame, read_frames, write_frames
 from training.data.rendering import render_world
@@ -93,28 +94,34 @@ class EvaluationPlan:
             TrainingDataError: a store that cannot be read.
             EvaluationError: a stored frame whose parts do not fit each other.
         """
-        stored = self._stored()
+        stored: dict[tuple[str, int], list[FrameRecord]] = {}
+        if self.store is not None and self.store.exists():
+            stored = _by_world(self.store)
         for seed in self.seeds:
             for scene in self.scenes:
                 records = stored.get((scene, seed), [])
                 if len(records) >= self.frames_per_seed:
-                    frames = (_load(record) for record in records[: self.frames_per_seed])
-                    yield from _numbered(scene, seed, frames)
+                    frames = [_load(record) for record in records[: self.frames_per_seed]]
                 else:
-                    yield from _numbered(scene, seed, self._render(scene, seed))
+                    frames = self._render(scene, seed)
+                for index, frame in enumerate(frames):
+                    yield EvaluationFrame(scene, seed, index, frame)
 
-    def _stored(self) -> dict[tuple[str, int], list[FrameRecord]]:
-        stored: dict[tuple[str, int], list[FrameRecord]] = {}
-        if self.store is not None and self.store.exists():
-            for record in read_frames(self.store):
-                stored.setdefault((record.scene, record.seed), []).append(record)
-        return stored
-
-    def _render(self, scene: str, seed: int) -> Sequence[NewFrame]:
+    def _render(self, scene: str, seed: int) -> list[NewFrame]:
+        """Frames of a world as they are read from a store, so that a stored world measures the same."""
         frames = render_world(load_scene(scene, seed), self.frames_per_seed)
-        if self.store is not None:
-            write_frames(self.store, scene, seed, frames)
-        return frames
+        with TemporaryDirectory() as folder:
+            root = Path(folder) if self.store is None else self.store
+            write_frames(root, scene, seed, frames)
+            return [_load(record) for record in _by_world(root)[scene, seed]]
+
+
+def _by_world(root: Path) -> dict[tuple[str, int], list[FrameRecord]]:
+    """Stored frames by scene and seed."""
+    worlds: dict[tuple[str, int], list[FrameRecord]] = {}
+    for record in read_frames(root):
+        worlds.setdefault((record.scene, record.seed), []).append(record)
+    return worlds
 
 
 def parse_seeds(text: str) -> tuple[int, ...]:
@@ -144,10 +151,3 @@ def _load(record: FrameRecord) -> NewFrame:
                 f"{size[1]}x{size[0]}: remove the folder {record.folder} and it is rendered again"
             )
     return NewFrame(image, depth, record.camera, record.mount, record.attitude, record.height_m)
-
-
-def _numbered(
-    scene: str, seed: int, frames: Iterator[NewFrame] | Sequence[NewFrame]
-) -> Iterator[EvaluationFrame]:
-    for index, frame in enumerate(frames):
-        yield EvaluationFrame(scene, seed, index, frame)

@@ -11,8 +11,8 @@ from training.evaluation_bands import band_names
 from training.evaluation_doubt import NOMINAL_COVERAGE, SIGMAS
 from training.evaluation_obstacles import FALSE_ALARM_M, MEASURED_M
 from training.evaluation_report import EvaluationReport, mean_points
-from training.evaluation_sky import FAR_M, SkyErrors
-from training.evaluation_sources import PERFECT, THERE, is_rescaled
+from training.evaluation_sky import FAR_M
+from training.evaluation_sources import CONSTANT, PERFECT, THERE, is_rescaled
 from training.evaluation_summary import SourceSummary
 from training.metrics import DepthMetrics
 
@@ -29,7 +29,7 @@ _MEDIAN, _METRES = "median", "metres"
 
 
 def tables(report: EvaluationReport) -> Iterator[Table]:
-    """Tables of each part of the data: errors, by distance, doubt, nearest obstacle; then one by group."""
+    """Tables of each part of the data: errors, by distance, doubt, sky, obstacles; then one by group."""
     for name, part in report.parts.items():
         errors = report.of(part)
         if not errors:
@@ -40,6 +40,8 @@ def tables(report: EvaluationReport) -> Iterator[Table]:
         networks = [row for row in rows if row.label in report.networks]
         if any(row.doubt is not None for row in networks):
             yield _doubt(f"{name}: sigma against the error, metric", networks)
+        if any(row.sky is not None for row in networks):
+            yield _sky(f"{name}: what is said of the sky", networks)
         if any(row.elements is not None for row in rows):
             yield _elements(f"{name}: nearest obstacle of each 5 degree element", rows)
     groups = [group for part in report.parts.values() for group in part]
@@ -86,13 +88,12 @@ def _bands(title: str, rows: Sequence[SourceSummary]) -> Table:
 
 def _doubt(title: str, rows: Sequence[SourceSummary]) -> Table:
     within = [f"<{sigma:g} sigma" for sigma in SIGMAS]
-    sky = f"sky >{FAR_M:g} m"
     table = _table(
         title,
         ("depth from",),
-        (*within, "Abs Rel", "surest half", "share", "pooled", "rank corr.", sky, "sigma there", "elsewhere"),
+        (*within, "Abs Rel", "surest half", "share", "pooled", "rank corr."),
     )
-    table.add_row("Gaussian errors", *(f"{share:.2f}" for share in NOMINAL_COVERAGE), *["-"] * 8)
+    table.add_row("Gaussian errors", *(f"{share:.2f}" for share in NOMINAL_COVERAGE), *["-"] * 5)
     table.add_section()
     for row in rows:
         doubt = row.doubt
@@ -106,16 +107,18 @@ def _doubt(title: str, rows: Sequence[SourceSummary]) -> Table:
                 _number(doubt.surest_abs_rel, doubt.all_abs_rel),
                 _number(together.surest_abs_rel, together.all_abs_rel),
                 f"{doubt.rank_correlation:.2f}",
-                *_sky(row.sky),
             )
     return table
 
 
-def _sky(sky: SkyErrors | None) -> list[str]:
-    if sky is None:
-        return ["-"] * 3
-    sigmas = ("-" if sigma is None else f"{sigma:.2f}" for sigma in (sky.sigma, sky.sigma_elsewhere))
-    return [_percent(sky.far_share), *sigmas]
+def _sky(title: str, rows: Sequence[SourceSummary]) -> Table:
+    table = _table(title, ("depth from",), (f">{FAR_M:g} m", "median sigma", "sigma elsewhere"))
+    for row in rows:
+        sky = row.sky
+        if sky is not None:
+            sigmas = ("-" if sigma is None else f"{sigma:.2f}" for sigma in (sky.sigma, sky.sigma_elsewhere))
+            table.add_row(row.label, _percent(sky.far_share), *sigmas)
+    return table
 
 
 def _elements(title: str, rows: Sequence[SourceSummary]) -> Table:
@@ -151,9 +154,8 @@ def _elements(title: str, rows: Sequence[SourceSummary]) -> Table:
 
 
 def _by_group(report: EvaluationReport, groups: Sequence[str]) -> Table:
-    """Abs Rel of each group: median-scaled without hints, metric with them."""
-    there = dict.fromkeys(label for item in report.errors for label in item.sources)
-    labels = [label for label in report.labels if label in there and label not in (THERE, PERFECT)]
+    """Abs Rel of the network in each group, and of the trivial answer that needs no knowledge."""
+    labels = [label for label in (*report.networks, CONSTANT) if label != THERE]
     table = _table("by group: Abs Rel, median-scaled / metric", ("", "frames"), labels)
     for group in groups:
         errors = report.of([group])
