@@ -16,8 +16,11 @@ from torch import Tensor, nn
 from training.errors import EvaluationError
 from training.evaluation_sheet import write_sheet
 from training.sequence_evaluation import SequenceReport, evaluate_disparity_network
+from training.sequences.garg_crop import garg_mask
+from training.sequences.kitti_raw import open_kitti_raw
 from uavdepth.errors import UavDepthError
 
+REAL = Path(__file__).parents[3] / "shared" / "data" / "kitti_raw"
 WIDTH, HEIGHT = 96, 64
 NEAR_M, FAR_M = 0.1, 100.0
 
@@ -216,3 +219,16 @@ def test_the_sheet_shows_pictures_spread_over_all(tmp_path: Path) -> None:
     picture = cv2.imread(str(tmp_path / "sheet.png"))
     assert picture is not None
     assert picture.shape[1] > 4 * 300
+
+
+@pytest.mark.skipif(not REAL.is_dir(), reason="KITTI samples (../shared/data) are not part of the project")
+def test_on_real_pictures_a_network_that_never_looks_is_the_constant_depth() -> None:
+    class NeverLooks(nn.Module):
+        def forward(self, image: Tensor) -> tuple[Tensor, ...]:
+            return (torch.full_like(image[:, :1], 0.3),)
+
+    drives = open_kitti_raw(REAL)[:1]
+    content = evaluate_disparity_network(NeverLooks(), drives, 128, 64, every=5, mask=garg_mask).as_json()
+    assert content["pictures"] == 2
+    assert content["median_scaled"] == content["constant_depth_median_scaled"]
+    assert content["median_scaled"]["abs_rel"] == pytest.approx(0.43, abs=0.05)
