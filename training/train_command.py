@@ -42,7 +42,9 @@ def train(
         typer.Option(help="Checkpoint of another run to start from, wherever its weights fit."),
     ] = None,
     resume: Annotated[bool, typer.Option(help="Go on from the checkpoint in the run's folder.")] = False,
-    seed: Annotated[int, typer.Option(help="Seed of random weights and of the order of pictures.")] = 0,
+    seed: Annotated[
+        int | None, typer.Option(help="Seed of random weights and of the order of pictures; 0 if not given.")
+    ] = None,
     precision: Annotated[str, typer.Option(help="auto, fp32 or bf16.")] = "auto",
     threads: Annotated[int | None, typer.Option(min=1, help="Threads; every core if not given.")] = None,
 ) -> None:
@@ -86,7 +88,9 @@ def _render(data: Path, scenes: str, seeds: int, frames_per_seed: int) -> None:
 SettingsMaker = Callable[["TrainingSettings | None"], "TrainingSettings"]
 
 
-def _settings_maker(minutes: float | None, images: int | None, seed: int, precision: str) -> SettingsMaker:
+def _settings_maker(
+    minutes: float | None, images: int | None, seed: int | None, precision: str
+) -> SettingsMaker:
     """How to get a run's settings, from those of its checkpoint if it goes on."""
     if minutes is not None and images is not None:
         raise TrainingSettingsError(f"--minutes {minutes:g} and --images {images}: a run has one length")
@@ -98,7 +102,12 @@ def _settings_maker(minutes: float | None, images: int | None, seed: int, precis
 
         if previous is None:
             length = DEFAULT_MINUTES if minutes is None and images is None else minutes
-            return TrainingSettings(images=images, minutes=length, seed=seed, precision=precision)
+            return TrainingSettings(images=images, minutes=length, seed=seed or 0, precision=precision)
+        if seed is not None and seed != previous.seed:
+            raise TrainingSettingsError(
+                f"--seed is {seed}, but the run was started with {previous.seed}: other pictures would "
+                "follow; leave it out, or start a new run with --output"
+            )
         if minutes is None and images is None:
             return replace(previous, precision=precision)
         return replace(previous, images=images, minutes=minutes, precision=precision)

@@ -191,6 +191,21 @@ def changed(path: Path, **entries: object) -> Path:
     return path
 
 
+def test_a_run_goes_on_while_the_disk_is_full(
+    pool: FramePool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refuse(self: Checkpoint, path: Path) -> None:
+        raise CheckpointError(f"{path} cannot be written: No space left on device")
+
+    trainer = Trainer(settings(), pool, pretrained=False)
+    monkeypatch.setattr(Checkpoint, "save", refuse)
+    monkeypatch.setattr(training.train_command, "_SAVE_EVERY_S", 0.0)
+    with pytest.raises(CheckpointError, match="No space left"):
+        training.train_command._run(trainer, tmp_path)
+    assert trainer.progress == 1.0
+    assert capsys.readouterr().err.count("No space left") > 1
+
+
 def test_an_old_checkpoint_is_refused_with_a_way_out(pool: FramePool, tmp_path: Path) -> None:
     path = tmp_path / "old.pt"
     Trainer(settings(), pool, pretrained=False).save(path)
@@ -322,6 +337,8 @@ def test_the_command_trains_and_refuses_to_overwrite(
     assert json.loads((tmp_path / "run" / "log.jsonl").read_text())["images"] == 8
     with pytest.raises(TrainingSettingsError, match="--resume"):
         CliRunner().invoke(app, words, catch_exceptions=False)
+    with pytest.raises(TrainingSettingsError, match="--seed is 5, but the run was started with 0"):
+        CliRunner().invoke(app, [*words, "--resume", "--seed", "5"], catch_exceptions=False)
     longer = [*words[:-1], "12", "--resume"]
     assert CliRunner().invoke(app, longer, catch_exceptions=False).exit_code == 0
     assert Checkpoint.load(tmp_path / "run" / "checkpoint.pt").images == 12

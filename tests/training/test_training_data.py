@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from frames import HEIGHT, WIDTH, ground_frame, make_store
@@ -266,6 +267,34 @@ def test_new_worlds_join_while_training_goes_on(tmp_path: Path) -> None:
     make_store(tmp_path, (("forest", 2),))
     pool.rescan()
     assert (len(pool), pool.worlds) == (9, 3)
+
+
+@pytest.mark.parametrize("depth", [math.nan, 0.0, -1.0])
+def test_a_depth_that_is_none_is_not_stored(tmp_path: Path, depth: float) -> None:
+    frame = ground_frame()
+    frame.depth_m[3, 4] = depth
+    with pytest.raises(TrainingDataError, match="frame 1 of city:7 has 1 pixels"):
+        write_frames(tmp_path, "city", 7, [ground_frame(), frame])
+    assert not has_frames(tmp_path, "city", 7)
+
+
+@pytest.mark.parametrize(("suffix", "read"), [(".jpg", "image_bgr"), (".png", "depth_m")])
+def test_a_picture_of_another_size_than_its_camera_is_named(tmp_path: Path, suffix: str, read: str) -> None:
+    record = read_frames(make_store(tmp_path, (("city", 0),)))[0]
+    path = record.folder / (record.name + suffix)
+    cv2.imwrite(str(path), np.zeros((50, 60, 3), np.uint8))
+    with pytest.raises(TrainingDataError, match=f"{path.name} is 60x50 pixels, its camera is 160x96"):
+        getattr(record, read)()
+
+
+def test_a_scene_of_few_frames_is_not_learnt_by_heart(tmp_path: Path) -> None:
+    pool = FramePool(make_store(tmp_path, (("city", 0), ("wall", 1))), shares={"city": 1.0, "wall": 1.0})
+    many = pool.draw(np.random.default_rng(1), 300)
+    assert 100 < sum(record.scene == "wall" for record in many) < 200
+    make_store(tmp_path, tuple(("city", seed) for seed in range(2, 11)))
+    pool.rescan()
+    fewer = pool.draw(np.random.default_rng(1), 300)
+    assert 10 < sum(record.scene == "wall" for record in fewer) < 60
 
 
 def test_frames_have_the_cameras_size() -> None:

@@ -41,11 +41,11 @@ class FrameRecord:
     height_m: float | None
 
     def image_bgr(self) -> NDArray[np.uint8]:
-        """(H, W, 3) picture."""
-        return self._read(".jpg", cv2.IMREAD_COLOR).astype(np.uint8)
+        """(H, W, 3) picture. Raises TrainingDataError: a file that is missing, broken or of another size."""
+        return self._read(".jpg", cv2.IMREAD_COLOR).astype(np.uint8, copy=False)
 
     def depth_m(self) -> NDArray[np.float32]:
-        """(H, W) exact z-depth, +inf for sky."""
+        """(H, W) exact z-depth, +inf for sky. Raises TrainingDataError as `image_bgr`."""
         return decode_depth16(self._read(".png", cv2.IMREAD_UNCHANGED).astype(np.uint16))
 
     def _read(self, suffix: str, flags: int) -> NDArray[np.generic]:
@@ -53,6 +53,11 @@ class FrameRecord:
         picture = cv2.imread(str(path), flags)
         if picture is None:
             raise TrainingDataError(f"cannot read the training frame {path}")
+        height, width = picture.shape[:2]
+        if (width, height) != (self.camera.width, self.camera.height):
+            raise TrainingDataError(
+                f"{path} is {width}x{height} pixels, its camera is {self.camera.width}x{self.camera.height}"
+            )
         return np.asarray(picture)
 
 
@@ -73,8 +78,17 @@ def write_frames(root: Path, scene: str, seed: int, frames: Sequence[NewFrame]) 
 
     Returns:
         The folder that was written.
+
+    Raises:
+        TrainingDataError: a depth that is NaN or not above 0, which no renderer gives.
     """
     folder = frames_folder(root, scene, seed)
+    for index, frame in enumerate(frames):
+        wrong = int(np.count_nonzero(~(frame.depth_m > 0)))
+        if wrong:
+            raise TrainingDataError(
+                f"frame {index} of {scene}:{seed} has {wrong} pixels whose depth is NaN or not above 0 m"
+            )
     folder.mkdir(parents=True, exist_ok=True)
     entries = []
     for index, frame in enumerate(frames):
