@@ -37,7 +37,7 @@ def rounded_network(network: DepthNetwork) -> DepthNetwork:
     rounded = copy.deepcopy(network).eval()
     for block in [module for module in rounded.modules() if isinstance(module, ConvNormRelu)]:
         block.convolution = fuse_conv_bn_eval(block.convolution, block.norm)
-        block.norm = nn.Identity()
+        block.register_module("norm", nn.Identity())
     with torch.no_grad():
         for name, parameter in rounded.named_parameters():
             if parameter.numel() < SMALLEST_HALVED:
