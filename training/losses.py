@@ -43,7 +43,7 @@ class LossWeights:
     absolute: float = 0.5
     shape: float = 1.0
     edges: float = 0.5
-    sigma: float = 0.1
+    sigma: float = 0.2
     uncorrected: float = 0.2
     far: float = 0.2
     near: float = 1.5
