@@ -49,7 +49,7 @@ def evaluate(
         Path | None,
         typer.Option(help="Measure on KITTI raw data in this folder instead: DATE/DRIVE/image_02/data."),
     ] = None,
-    every: Annotated[int, typer.Option(min=1, help="With --kitti: each so manyeth picture.")] = 1,
+    every: Annotated[int, typer.Option(min=1, help="With --kitti: one picture of so many.")] = 1,
     points: Annotated[
         str | None,
         typer.Option(

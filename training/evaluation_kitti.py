@@ -45,10 +45,10 @@ class KittiFrame:
 
 
 def kitti_frames(drives: Sequence[KittiDrive], every: int = 1) -> list[KittiFrame]:
-    """Each so manyeth picture of the left colour camera of each drive.
+    """Pictures of the left colour camera of each drive, one of every so many.
 
     Raises:
-        EvaluationError: none, or `every` below 1.
+        EvaluationError: no pictures, or `every` below 1.
     """
     if every < 1:
         raise EvaluationError(f"every is {every}: 1 or more is needed")

@@ -74,7 +74,7 @@ def evaluate_kitti(model: DepthModel, root: Path, point_counts: Sequence[int], e
         model: the network.
         root: folder with the raw data's own layout.
         point_counts: how many LiDAR points are told, one mode for each.
-        every: take each so manyeth picture.
+        every: one picture of so many is taken.
 
     Raises:
         TrainingDataError: no drives there, or a broken calibration.

@@ -66,7 +66,7 @@ class SequenceReport:
 
     Args:
         width, height: the network's input, pixels.
-        every: each so manyeth picture was measured.
+        every: one picture of so many was measured.
         pictures: errors of each.
         skipped: what could not be measured, and why.
         rows: pictures for a sheet.
@@ -119,7 +119,7 @@ def evaluate_disparity_network(
         network: RGB (N, 3, H, W) in 0..1 -> sigmoid disparities, finest first; left in the mode it was in.
         sequences: whose pictures with a truth are measured; others are counted as skipped.
         width, height: the network's input, pixels, divisible by 32.
-        every: take each so manyeth picture of a sequence, from its first.
+        every: one picture of so many is taken, from the first of each sequence.
         min_depth_m, max_depth_m: what disparities 1 and 0 mean, as in training.
         mask: pixels to score; None: all.
         sheet_rows: pictures to keep for a sheet (`training.evaluation_sheet.write_sheet`).
