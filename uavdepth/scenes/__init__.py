@@ -10,7 +10,7 @@ from uavdepth.scenes.heap import trim_heap
 from uavdepth.scenes.picture import RenderedPicture
 from uavdepth.scenes.scene import Scene
 
-SCENE_NAMES = ("mountain", "city", "wall", "forest", "park")
+SCENE_NAMES = ("mountain", "city", "wall", "forest", "park", "suburb")
 """Worlds that `load_scene` knows; each is the module of that name in this package."""
 
 __all__ = ["SCENE_NAMES", "RenderedPicture", "Scene", "load_scene", "parse_scene"]

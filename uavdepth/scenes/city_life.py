@@ -109,11 +109,16 @@ def _off_crossings(along_m: float, others: list[Street], margin_m: float) -> boo
     return min(abs(along_m - other.middle_m) - other.half_width_m for other in others) > margin_m
 
 
-def add_traffic(builder: MeshBuilder, rng: np.random.Generator, plan: CityPlan, gap_m: float) -> None:
-    """Put vehicles on all lanes, `gap_m` apart on average. They keep to the right."""
+def add_traffic(
+    builder: MeshBuilder, rng: np.random.Generator, plan: CityPlan, gap_m: float, parked_m: float = 2.0
+) -> None:
+    """Put vehicles on all lanes, `gap_m` apart on average and off the `parked_m` along the kerbs.
+
+    They keep to the right.
+    """
     traffic = Traffic(rng)
     for axis, street, others in plan.streets():
-        half_lane = 0.5 * (street.half_road_m - 2.0)
+        half_lane = 0.5 * (street.half_road_m - parked_m)
         for way in (1.0, -1.0):
             # Seen along its way, a lane that leads north lies east of the middle, one that leads east south.
             across = street.middle_m + way * half_lane * (1.0 if axis == 1 else -1.0)
@@ -188,8 +193,8 @@ def add_overhead(builder: MeshBuilder, rng: np.random.Generator, plan: CityPlan,
     for axis, street, others in plan.streets():
         luck = rng.random()
         side = float(rng.choice([-1.0, 1.0]))
-        line = street.middle_m + side * (street.half_road_m + 0.45)
-        crosses_corridor = axis == 0 and -14.0 < street.middle_m < plan.facade_m + 1.0
+        line = street.middle_m + side * (street.half_width_m + 0.45)
+        crosses_corridor = axis == 0 and -18.0 < street.middle_m < plan.facade_m + 1.0
         ends_at_front = axis == 1 and street.middle_m == 0.0
         if luck < lines and not crosses_corridor:
             last = plan.facade_m - 24.0 if ends_at_front else _LIVELY_M
@@ -207,8 +212,9 @@ def _add_hung_lamp(
 ) -> None:
     """A lamp in the middle of a wire between the houses of both sides."""
     height = KERB_M + rng.uniform(6.2, 8.0)
-    ends = [_place(axis, along_m, street.middle_m + side * street.half_width_m) for side in (-1, 1)]
-    beyond = [_place(axis, along_m, street.middle_m + side * (street.half_width_m + 1)) for side in (-1, 1)]
+    wall_m = street.half_width_m + PAVEMENT_M
+    ends = [_place(axis, along_m, street.middle_m + side * wall_m) for side in (-1, 1)]
+    beyond = [_place(axis, along_m, street.middle_m + side * (wall_m + 1.0)) for side in (-1, 1)]
     held = all(any(_holds(house, spot, height) for house in plan.houses) for spot in beyond)
     if not held or not plan.keeps_free(*ends):
         return
@@ -261,7 +267,8 @@ def _add_bridges(builder: MeshBuilder, rng: np.random.Generator, plan: CityPlan)
     for _ in range(int(rng.integers(0, 4))):
         axis, street, others = streets[int(rng.integers(len(streets)))]
         along, width = rng.uniform(-90.0, 90.0), rng.uniform(1.8, 3.5)
-        ends = [_place(axis, along, street.middle_m + side * (street.half_width_m + 0.4)) for side in (-1, 1)]
+        wall_m = street.half_width_m + PAVEMENT_M + 0.4
+        ends = [_place(axis, along, street.middle_m + side * wall_m) for side in (-1, 1)]
         free = plan.keeps_free(*ends) and _off_crossings(along, others, 3.0)
         if free and not plan.is_built_over(axis, street, along):
             clear = rng.uniform(4.3, 7.0)

@@ -21,13 +21,15 @@ CORRIDOR_M = 3.4
 
 @dataclass(frozen=True)
 class Street:
-    """A street by its middle line and half the width of its road, metres."""
+    """A street by its middle line and half the width of its lanes, metres; the asphalt goes on to the kerbs
+    for the width of a pavement."""
 
     middle_m: float
     half_road_m: float
 
     @property
     def half_width_m(self) -> float:
+        """From the middle line to the kerb."""
         return self.half_road_m + PAVEMENT_M
 
 
@@ -36,14 +38,19 @@ def draw_street(rng: np.random.Generator) -> Street:
     return Street(0.0, float(rng.uniform(3.5, 6.5)))
 
 
-def parallel_streets(rng: np.random.Generator, first: Street) -> list[Street]:
-    """Streets on both sides of `first`, sorted, about 40 to 65 m apart."""
+def parallel_streets(
+    rng: np.random.Generator,
+    first: Street,
+    apart_m: tuple[float, float] = (42.0, 64.0),
+    half_road_m: tuple[float, float] = (3.5, 6.5),
+) -> list[Street]:
+    """Streets on both sides of `first`, sorted, of random distances and widths between two bounds."""
     streets = [first]
     for side in (-1.0, 1.0):
         place = first.middle_m
         while abs(place - first.middle_m) < REACH_M - 40.0:
-            place += side * rng.uniform(42.0, 64.0)
-            streets.append(Street(place, float(rng.uniform(3.5, 6.5))))
+            place += side * rng.uniform(*apart_m)
+            streets.append(Street(place, float(rng.uniform(*half_road_m))))
     return sorted(streets, key=lambda street: street.middle_m)
 
 
