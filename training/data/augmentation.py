@@ -10,6 +10,10 @@ from numpy.typing import NDArray
 
 MAX_ZOOM = 1.3
 MAX_STRETCH = 1.12
+WIDE_SHARE = 0.3
+MAX_WIDENING = 1.8
+"""Some cameras have pictures much wider than the network's 2:1, up to 3.5:1; stretched to it they show things
+taller than they are. Their share, and by how much the window is wider than 2:1 at most."""
 
 
 @dataclass(frozen=True)
@@ -29,11 +33,12 @@ class Crop:
 
 
 def sample_crop(rng: np.random.Generator, width: int, height: int) -> Crop:
-    """A window of at least 1 / `MAX_ZOOM` of the picture, its aspect a little off."""
+    """A window of at least 1 / `MAX_ZOOM` of the picture's width, its aspect a little off or much wider."""
     zoom = rng.uniform(1.0, MAX_ZOOM)
     stretch = MAX_STRETCH ** rng.uniform(-1.0, 1.0)
+    widening = rng.uniform(1.0, MAX_WIDENING) if rng.random() < WIDE_SHARE else 1.0
     crop_width = min(width, round(width / zoom * stretch**0.5))
-    crop_height = min(height, round(height / zoom / stretch**0.5))
+    crop_height = min(height, round(height / zoom / stretch**0.5 / widening))
     left = int(rng.integers(0, width - crop_width + 1))
     top = int(rng.integers(0, height - crop_height + 1))
     return Crop(left, top, crop_width, crop_height, bool(rng.random() < 0.5))
