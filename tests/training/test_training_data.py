@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from training.data.augmentation import Crop, change_light, cut_depth, cut_image, sample_crop
+from training.data.augmentation import MAX_WIDENING, Crop, change_light, cut_depth, cut_image, sample_crop
 from training.data.batches import BatchRequest, BatchSource, FramePool, make_batch, network_image
 from training.data.camera_sampling import (
     FIELD_OF_VIEW_DEG,
@@ -202,7 +202,16 @@ def test_crops_lie_within_the_picture_and_keep_most_of_it(seed: int) -> None:
     assert 0 <= crop.left <= 480 - crop.width
     assert 0 <= crop.top <= 240 - crop.height
     assert crop.width > 0.6 * 480
-    assert crop.height > 0.6 * 240
+    assert crop.height > 0.6 * 240 / MAX_WIDENING
+
+
+def test_some_crops_are_as_wide_as_wide_cameras_pictures() -> None:
+    rng = np.random.default_rng(0)
+    aspects = np.array(
+        [crop.width / crop.height for crop in (sample_crop(rng, 480, 240) for _ in range(400))]
+    )
+    assert 0.1 < np.mean(aspects > 2.6) < 0.3
+    assert aspects.max() > 3.3
 
 
 def test_picture_and_depth_are_cut_and_mirrored_alike() -> None:
