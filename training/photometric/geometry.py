@@ -149,12 +149,14 @@ def warp(source: Tensor, inverse_depth: Tensor, motion: Tensor) -> Tensor:
 @lru_cache(maxsize=16)
 def pixel_grid(height: int, width: int, dtype: torch.dtype, device: torch.device) -> Tensor:
     """(3, H * W) homogeneous pixel coordinates x, y, 1 in row order; shared, not to be written to."""
-    y, x = torch.meshgrid(
-        torch.arange(height, dtype=dtype, device=device),
-        torch.arange(width, dtype=dtype, device=device),
-        indexing="ij",
-    )
-    return torch.stack((x.flatten(), y.flatten(), torch.ones_like(x).flatten()))
+    # What the first validation left here must serve the training that follows.
+    with torch.inference_mode(False):
+        y, x = torch.meshgrid(
+            torch.arange(height, dtype=dtype, device=device),
+            torch.arange(width, dtype=dtype, device=device),
+            indexing="ij",
+        )
+        return torch.stack((x.flatten(), y.flatten(), torch.ones_like(x).flatten()))
 
 
 def check_pair(picture: Tensor, intrinsics: Tensor, source_from_target: Tensor) -> None:

@@ -21,7 +21,10 @@ _NEAR = np.float32(MIN_DEPTH_RATIO)
 
 
 def _kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile at the first call, keep on disk, run without the GIL; inf and NaN stay what they are."""
+    """Compile at the first call, keep on disk, run without the GIL; inf and NaN stay what they are.
+
+    Numba watches this file alone: after a change of the constants that it imports, touch it.
+    """
     compiled: Callable[..., Any] = njit(
         cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz", "arcp"}, error_model="numpy"
     )(function)

@@ -27,8 +27,10 @@ def upsample(values: Tensor, height: int, width: int) -> Tensor:
 @lru_cache(maxsize=64)
 def _weights(size: int, upsampled: int, dtype: torch.dtype, device: torch.device) -> Tensor:
     """(upsampled, size): what each new pixel takes of the old; shared, not to be written to."""
-    # The outer edges of the pictures coincide, so a new centre x lies at (x + 1/2) size / upsampled - 1/2.
-    place = (torch.arange(upsampled, dtype=torch.float64) + 0.5) * (size / upsampled) - 0.5
-    place = place.clamp(0.0, size - 1.0)
-    distance = place[:, None] - torch.arange(size, dtype=torch.float64)
-    return (1.0 - distance.abs()).clamp_min(0.0).to(dtype=dtype, device=device)
+    # What the first validation left here must serve the training that follows.
+    with torch.inference_mode(False):
+        # The outer edges of the pictures coincide: a new centre x lies at (x + 1/2) size / upsampled - 1/2.
+        place = (torch.arange(upsampled, dtype=torch.float64) + 0.5) * (size / upsampled) - 0.5
+        place = place.clamp(0.0, size - 1.0)
+        distance = place[:, None] - torch.arange(size, dtype=torch.float64)
+        return (1.0 - distance.abs()).clamp_min(0.0).to(dtype=dtype, device=device)
