@@ -152,9 +152,14 @@ class GroundScaler:
         if not (math.isfinite(attitude.roll_rad) and math.isfinite(attitude.pitch_rad)):
             return None
         log_plane, log_ratio, tile = self._ratios(np.asarray(depth_m), attitude, height_m)
-        mode = _mode(log_ratio)
+        if log_ratio.size < _MIN_PIXELS:
+            return None
+        # A network that is not metric may count in any unit: factors are searched around its own.
+        centre = np.float32(_median(log_ratio) if math.isinf(self._plausible[1]) else 0.0)
+        mode = _mode(log_ratio - centre)
         if mode is None:
             return None
+        mode += float(centre)
         near = np.abs(log_ratio - np.float32(mode)) < _GATE
         log_plane, log_ratio, tile = log_plane[near], log_ratio[near], tile[near]
         log_factor, gate = _refine(log_ratio, mode)
@@ -192,9 +197,7 @@ class GroundScaler:
 
 
 def _mode(log_ratio: NDArray[np.float32]) -> float | None:
-    """The most frequent log ratio, or None where there are too few or a rival peak is as good."""
-    if log_ratio.size < _MIN_PIXELS:
-        return None
+    """The most frequent log ratio, or None where too few agree or a rival peak is as good."""
     keys = ((log_ratio + np.float32(_LARGEST_LOG_FACTOR)) * np.float32(1 / _BIN)).astype(np.int64)
     keys = keys[(keys >= 0) & (keys < _BINS)]
     smooth = np.convolve(np.bincount(keys, minlength=_BINS), _KERNEL, mode="same")

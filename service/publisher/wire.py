@@ -196,7 +196,8 @@ class StatusSample(_Message):
         latency_ms_p50, latency_ms_p95: from capture to wire; None before the first message.
         dropped_frames, dropped_samples: values that a newer one replaced, per slot.
         model_failures: pictures that the network failed on.
-        scale_factor, scale_relative_sigma, scale_age_s: metric scale from the ground; None if there is none.
+        scale_factor, scale_relative_sigma, scale_age_s: metric scale of the newest picture; None if it has
+            none. A network that answers in metres has the factor 1 and a sigma of its own.
         height_m, mode, armed: of the vehicle; None if not heard.
         camera, camera_detail: state of the camera.
         link_connected, autopilot, system_id: of the MAVLink link.

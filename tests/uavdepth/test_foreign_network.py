@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from onnx import TensorProto
 from onnx_files import HEIGHT, WIDTH, card_values, write_formatted_network, write_red_network, write_toml_card
 
 from uavdepth import CameraModel, DepthMap, DepthModel, ModelCard, ModelCardError, ModelFileError
+from uavdepth.model_card import OutputKind
 
 CAMERA = CameraModel.from_fov(96, 64, 90)
 DEPTH_ANYTHING = Path(__file__).parents[1] / "data" / "depth_anything_tiny.onnx"
@@ -252,3 +254,19 @@ def test_a_free_size_keeps_the_cameras_shape_and_the_cards_area() -> None:
     assert width % 14 == height % 14 == 0
     assert width / height == pytest.approx(1920 / 1080, rel=0.05)
     assert width * height == pytest.approx(518 * 518, rel=0.05)
+
+
+DOCUMENT = Path(__file__).parents[2] / "docs" / "foreign-networks.md"
+EXAMPLES = re.findall(r"```toml\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.DOTALL)
+
+
+@pytest.mark.parametrize("text", EXAMPLES)
+def test_the_cards_in_the_documentation_can_be_read(text: str) -> None:
+    assert ModelCard.from_toml(text.encode(), str(DOCUMENT)).card_version == 2
+
+
+def test_the_documentation_has_cards_and_names_every_output() -> None:
+    assert len(EXAMPLES) == 2
+    text = DOCUMENT.read_text(encoding="utf-8")
+    for kind in get_args(OutputKind):
+        assert f"`{kind}`" in text

@@ -21,7 +21,7 @@ def slope(camera: CameraModel, height_m: float, rise: float) -> np.ndarray:
 
 
 class TestFactor:
-    @pytest.mark.parametrize("true_factor", [0.05, 0.4, 1.0, 2.5, 20.0])
+    @pytest.mark.parametrize("true_factor", [1e-4, 0.05, 0.4, 1.0, 2.5, 20.0, 5000.0])
     @pytest.mark.parametrize("height", [0.8, 3.0, 15.0])
     def test_bare_ground_gives_the_factor(self, camera, mount, level, true_factor, height):
         network = depth_of([ground(height)], camera, mount, level) / true_factor
