@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,6 +15,7 @@ import pytest
 from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 from program_fakes import FLYING_HEIGHT_M, LEVEL, make_settings, picture, wall_over_ground
+from structlog.testing import capture_logs
 
 from service.errors import ConfigError
 from service.frame import Frame
@@ -26,6 +28,7 @@ from uavdepth.depth_map import DepthMap
 from uavdepth.hints import Hints
 from uavdepth.model_card import CARD_METADATA_KEY
 from uavdepth.obstacle_scan import SectorState
+from uavdepth.providers import PROVIDERS, OpenedSession, ProviderUnavailableError
 from uavdepth.scanner import ObstacleScanner
 
 SETTINGS = make_settings()
@@ -273,3 +276,23 @@ def test_a_network_without_scale_and_shift_is_refused_by_its_name(tmp_path: Path
     settings = make_settings(f"model.path={path}", f"model.card={card}", "model.provider=cpu")
     with pytest.raises(ConfigError, match="anything tells inverse depth up to an unknown scale and shift"):
         Perception.load(settings)
+
+
+def test_the_log_says_what_runs_the_network_and_once_why_not_something_faster(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(path: Path, threads: int | None) -> OpenedSession:
+        raise ProviderUnavailableError("it offers no GPU device on this machine")
+
+    for name in ("tensorrt", "cuda", "openvino"):
+        is_there = name == "tensorrt"
+        changed = replace(PROVIDERS[name], is_installed=lambda is_there=is_there: is_there, open=refuse)
+        monkeypatch.setitem(PROVIDERS, name, changed)
+    path = write_hinted_network(tmp_path / "ground.onnx")
+    with capture_logs() as entries, warnings.catch_warnings():
+        warnings.simplefilter("error")
+        Perception.load(make_settings(f"model.path={path}"))
+    (said,) = (entry for entry in entries if entry["event"] == "network")
+    assert (said["name"], said["provider"], said["precision"]) == ("ground", "cpu", "fp32")
+    (warned,) = (entry for entry in entries if entry["log_level"] == "warning")
+    assert "TensorRT for RTX cannot be used: it offers no GPU" in warned["why"]
