@@ -10,10 +10,13 @@ from uavdepth.scenes.heap import trim_heap
 from uavdepth.scenes.picture import RenderedPicture
 from uavdepth.scenes.scene import Scene
 
-SCENE_NAMES = ("mountain", "city", "wall", "forest", "park", "suburb")
+SCENE_NAMES = ("mountain", "city", "wall", "forest", "park", "suburb", "works")
 """Worlds that `load_scene` knows; each is the module of that name in this package."""
 
-__all__ = ["SCENE_NAMES", "RenderedPicture", "Scene", "load_scene", "parse_scene"]
+HELD_OUT_SCENES = ("works",)
+"""Worlds that no training sees: they show how a network copes with a kind of place that is new to it."""
+
+__all__ = ["HELD_OUT_SCENES", "SCENE_NAMES", "RenderedPicture", "Scene", "load_scene", "parse_scene"]
 
 
 def load_scene(name: str, seed: int = 0) -> Scene:

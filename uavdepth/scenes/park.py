@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from uavdepth.scenes.bridges import add_bridge
 from uavdepth.scenes.buildings import add_gable, add_house
@@ -53,7 +53,7 @@ class _Park:
     autumn: float
     snowy: bool
 
-    def free(self, places: NDArray[np.float64], reach_m: float) -> NDArray[np.bool_]:
+    def free(self, places: NDArray[np.float64], reach_m: ArrayLike) -> NDArray[np.bool_]:
         """(K,) whether things of that reach keep the corridor free and stand within the park."""
         inside = np.abs(places).max(axis=1) < CORE_M - 2.0
         return np.asarray(inside & self.corridor.is_free_around(places, reach_m))
@@ -93,13 +93,15 @@ def _add_trees(park: _Park) -> None:
     places = rng.uniform(-CORE_M, CORE_M, (3 * _TREES, 2))
     groves = LandNoise(rng, 26.0).at(places[:, 0], places[:, 1]) + rng.normal(0.0, 0.3, len(places))
     places = places[groves > rng.uniform(0.0, 0.35)]
-    places = places[park.free(places, 3.5) & park.lawns.is_lawn(places, 0.9)][:_TREES]
+    places = places[park.free(places, 1.0) & park.lawns.is_lawn(places, 0.9)][:_TREES]
     kinds = list(park.kinds)
     species = rng.choice(len(kinds), size=len(places), p=list(park.kinds.values()))
     for number, kind in enumerate(kinds):
         templates = [tree_template(rng, kind, float(rng.uniform(7.0, 12.0)), park.autumn) for _ in range(3)]
-        feet = park.lawns.feet(places[species == number])
-        plant(park.builder, rng, templates, feet, rng.uniform(4.5, 14.0, len(feet)))
+        heights = rng.uniform(4.5, 14.0, len(places))
+        reach = max(template.reach for template in templates) * heights
+        here = (species == number) & park.corridor.is_free_around(places, reach)
+        plant(park.builder, rng, templates, park.lawns.feet(places[here]), heights[here])
     if not park.snowy:
         places = rng.uniform(-CORE_M, CORE_M, (60, 2))
         places = places[park.free(places, 2.0) & park.lawns.is_lawn(places, 1.5)]
@@ -135,7 +137,7 @@ def _add_along_paths(park: _Park) -> None:
             spots = np.array(
                 [_beside(path, number, side)[0] for number in range(start, min(start + 14, last))]
             )
-            if park.free(spots, 0.5).all():
+            if park.free(spots, 1.0).all():
                 kind = FENCE_KINDS[int(rng.integers(3))]
                 add_fence(builder, rng, lawns.feet(spots), kind)
     shore = lawns.feet(lawns.pond.shore(1.2, 49))[: int(rng.integers(10, 49))]
