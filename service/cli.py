@@ -51,6 +51,9 @@ COMMANDS = {
         "service.fake_autopilot.command", "fake_autopilot", "Speak MAVLink like ArduPilot or PX4.", "sim"
     ),
     "benchmark": Command("service.benchmark.command", "benchmark", "Measure speed and memory."),
+    "model": Command(
+        "service.model_command", "model_app", "Check a depth network and its card.", is_group=True
+    ),
     "train": Command("training.commands", "train", "Train a depth network.", "train"),
     "train-video": Command(
         "training.selfsupervised.command", "train_video", "Train depth from video alone.", "train"

@@ -11,10 +11,7 @@ from training.data.frame_store import FrameRecord, NewFrame, read_frames, write_
 from training.data.rendering import render_world
 from training.data.seed_split import SeedSplit
 from training.errors import EvaluationError
-from uavdepth import scenes as worlds
-from uavdepth.scenes import SCENE_NAMES, load_scene
-
-HELD_OUT_SCENES: tuple[str, ...] = getattr(worlds, "HELD_OUT_SCENES", ())
+from uavdepth.scenes import HELD_OUT_SCENES, SCENE_NAMES, load_scene
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 import torch
 from lightning_fabric import Fabric
+from recordings import write_wall_recording
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from torch import Tensor
 
-from tests.training.recordings import write_wall_recording
 from training.errors import CheckpointError, TrainingSettingsError
 from training.selfsupervised import command
 from training.selfsupervised.frames import open_triplets

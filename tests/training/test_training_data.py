@@ -32,6 +32,7 @@ from training.data.seed_split import SeedSplit
 from training.errors import TrainingDataError
 from training.normalization import MAX_DEPTH_M, depth_from_output, log_inverse_depth
 from uavdepth.attitude import Attitude
+from uavdepth.scenes import HELD_OUT_SCENES
 
 
 @given(st.integers(0, 999_999))
@@ -62,6 +63,21 @@ def test_a_plan_for_training_refuses_a_world_kept_for_tests(tmp_path: Path) -> N
 def test_training_refuses_a_store_with_a_test_world(tmp_path: Path) -> None:
     make_store(tmp_path, (("city", 3), ("city", 1000)))
     with pytest.raises(TrainingDataError, match="seed 1000 belongs to test"):
+        FramePool(tmp_path)
+
+
+@pytest.mark.parametrize("scene", HELD_OUT_SCENES)
+def test_a_held_out_scene_is_never_trained_on(tmp_path: Path, scene: str) -> None:
+    plan = RenderPlan(tmp_path, ("wall", scene), SeedSplit.TRAIN, 0, 1, 1)
+    with pytest.raises(TrainingDataError, match=rf"{scene}.*held out"):
+        list(plan.worlds())
+    SeedSplit.TEST.require_world(scene, 1000)
+
+
+def test_a_store_with_frames_of_a_held_out_scene_is_refused(tmp_path: Path) -> None:
+    folder = write_frames(tmp_path, HELD_OUT_SCENES[0], 3, [ground_frame()])
+    assert folder.is_dir()
+    with pytest.raises(TrainingDataError, match="held out"):
         FramePool(tmp_path)
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from training.data.augmentation import change_light, cut_depth, cut_image, sample_crop
+from training.data.camera_effects import camera_effects
 from training.data.frame_store import FrameRecord, FrameStore
 from training.data.hint_sampling import HintShares, hint_maps, sample_hints
 from training.data.seed_split import SeedSplit
@@ -70,7 +71,7 @@ class FramePool:
         """Look again. Raises TrainingDataError: no store, none complete, or a seed kept for tests."""
         by_scene: dict[str, list[FrameRecord]] = {}
         for record in self._store.frames():
-            SeedSplit.TRAIN.require(record.seed)
+            SeedSplit.TRAIN.require_world(record.scene, record.seed)
             by_scene.setdefault(record.scene, []).append(record)
         if not by_scene:
             raise TrainingDataError(f"no training frames in {self._store.root}")
@@ -126,7 +127,8 @@ def _make_item(
     """Picture, depth, ground, points and focal length of one frame, augmented."""
     crop = sample_crop(rng, record.camera.width, record.camera.height)
     depth_m = cut_depth(record.depth_m(), crop, width, height)
-    picture = change_light(rng, cut_image(record.image_bgr(), crop, width, height))
+    picture = camera_effects(rng, cut_image(record.image_bgr(), crop, width, height), depth_m)
+    picture = change_light(rng, picture)
     view = view_of_crop(View(record.camera, record.mount, record.attitude), crop, width, height)
     hints = sample_hints(rng, view, record.height_m, picture, depth_m, shares)
     ground, points = hint_maps(hints, view, width, height)

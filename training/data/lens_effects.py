@@ -14,7 +14,7 @@ _VIEW = 3.0
 
 
 def rain_drops(rng: np.random.Generator, image_bgr: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """One to nine drops: each a small upside-down blurred view of its surroundings with a soft edge.
+    """Two to eleven drops: each a small upside-down blurred view of its surroundings with a soft edge.
 
     Args:
         rng: decides where and how large.
@@ -22,7 +22,7 @@ def rain_drops(rng: np.random.Generator, image_bgr: NDArray[np.uint8]) -> NDArra
     """
     height, width = image_bgr.shape[:2]
     picture = image_bgr.copy()
-    for _ in range(int(rng.integers(1, 10))):
+    for _ in range(int(rng.integers(2, 12))):
         diameter = width * np.exp(rng.uniform(np.log(SMALLEST_DROP), np.log(LARGEST_DROP)))
         size = max(3, round(diameter))
         left, top = (int(rng.integers(0, max(1, side - size))) for side in (width, height))

@@ -43,8 +43,8 @@ class RenderPlan:
     def worlds(self) -> Iterable[tuple[str, int]]:
         """Scene and seed of each world, seeds outermost, so that an unfinished store is balanced."""
         for seed in range(self.first_seed, self.first_seed + self.seeds):
-            self.split.require(seed)
             for scene in self.scenes:
+                self.split.require_world(scene, seed)
                 yield scene, seed
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from enum import Enum
 
 from training.errors import TrainingDataError
+from uavdepth.scenes import HELD_OUT_SCENES
 
 
 class SeedSplit(Enum):
@@ -21,6 +22,12 @@ class SeedSplit(Enum):
             if seed in split.value:
                 return split
         raise TrainingDataError(f"scene seed is {seed}: 0 to {cls.TEST.value.stop - 1} is needed")
+
+    def require_world(self, scene: str, seed: int) -> None:
+        """Raise TrainingDataError unless this split may see that world: some scenes are never trained on."""
+        self.require(seed)
+        if self is SeedSplit.TRAIN and scene in HELD_OUT_SCENES:
+            raise TrainingDataError(f"scene {scene!r} is held out: no training may see it, whatever its seed")
 
     def require(self, seed: int) -> None:
         """Raise TrainingDataError unless `seed` belongs to this split."""
