@@ -139,12 +139,6 @@ def parse_seeds(text: str) -> tuple[int, ...]:
 
 
 def _load(record: FrameRecord) -> NewFrame:
-    image, depth = record.image_bgr(), record.depth_m()
-    size = (record.camera.height, record.camera.width)
-    for what, shape, suffix in (("picture", image.shape, ".jpg"), ("depth", depth.shape, ".png")):
-        if shape[:2] != size or len(shape) != (3 if what == "picture" else 2):
-            raise EvaluationError(
-                f"the {what} {record.folder / (record.name + suffix)} has the shape {shape}, its camera is "
-                f"{size[1]}x{size[0]}: remove the folder {record.folder} and it is rendered again"
-            )
-    return NewFrame(image, depth, record.camera, record.mount, record.attitude, record.height_m)
+    return NewFrame(
+        record.image_bgr(), record.depth_m(), record.camera, record.mount, record.attitude, record.height_m
+    )

@@ -207,7 +207,9 @@ def test_a_stored_picture_of_another_size_is_named(tmp_path: Path) -> None:
     make_store(tmp_path, (("city", 1000),))
     cv2.imwrite(str(tmp_path / "city-001000" / "0001.jpg"), np.zeros((10, 20, 3), np.uint8))
     plan = EvaluationPlan(("city",), (1000,), 2, tmp_path)
-    with pytest.raises(EvaluationError, match=rf"0001\.jpg .*\(10, 20, 3\), its camera is {WIDTH}x{HEIGHT}"):
+    with pytest.raises(
+        TrainingDataError, match=rf"0001\.jpg is 20x10 pixels, its camera is {WIDTH}x{HEIGHT}"
+    ):
         list(plan.frames())
 
 
