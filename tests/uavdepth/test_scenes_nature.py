@@ -1,4 +1,4 @@
-"""The scenes `mountain` and `forest`: take-off place, corridor, ground, flights, variety."""
+"""The scenes `mountain`, `forest` and `park`: take-off place, corridor, ground, flights, variety."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from uavdepth.scenes.path_growth import CLEARANCE_M
 
 NORTH = (1.0, 0.0, 0.0)
 DOWN = (0.0, 0.0, 1.0)
-WORLDS = [("mountain", 0), ("mountain", 3), ("forest", 0), ("forest", 2)]
+WORLDS = [("mountain", 0), ("mountain", 3), ("forest", 0), ("forest", 2), ("park", 0), ("park", 3)]
 
 
 _loaded = lru_cache(load_scene)
@@ -79,7 +79,9 @@ def test_flights_are_clear_of_the_scene(scene: Scene) -> None:
         assert min(clearances) >= CLEARANCE_M
 
 
-@pytest.mark.parametrize(("name", "seed", "other_seed"), [("mountain", 0, 3), ("forest", 0, 2)])
+@pytest.mark.parametrize(
+    ("name", "seed", "other_seed"), [("mountain", 0, 3), ("forest", 0, 2), ("park", 0, 3)]
+)
 def test_the_same_seed_is_the_same_picture_and_another_seed_is_another(
     name: str, seed: int, other_seed: int
 ) -> None:
