@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from uavdepth.scenes.textures import VARIANTS, painted, texture_source
+from uavdepth.scenes.textures import TEXTURES, VARIANTS, painted, texture_source
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def _levels(texels: int) -> int:
     return (3 * texels + 1).bit_length() // 2
 
 
-@lru_cache(maxsize=128)
+@lru_cache(maxsize=len(TEXTURES) * VARIANTS)
 def _pyramid(name: str, variant: int) -> NDArray[np.uint32]:
     """Texels from the painted size down to 1 x 1, averaged in linear light."""
     picture = painted(name, variant)
