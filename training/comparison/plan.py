@@ -12,8 +12,8 @@ WIDTH, HEIGHT = 128, 96
 IMAGE_STEPS = 30_000
 BATCH = 8
 SMOOTHNESS = 0.001
-"""Monodepth2's. With the paper's 0.04 the depth of Monodepth2 was still one plane after 4,000 pictures of this
-size (Abs Rel as of constant depth), with 0.001 it had begun to have a shape after 3,200."""
+"""Monodepth2's. With the paper's 0.04 the depth of Monodepth2 was still one plane after 4,000 pictures of
+this size (Abs Rel as of constant depth), with 0.001 it had begun to have a shape after 3,200."""
 
 START_IMAGES = 16_000
 """Pictures shown to the encoder that all networks start from."""

@@ -104,7 +104,8 @@ def _document(results: dict[str, ComparisonResult]) -> str:
         f"{settings['learning_rate']:g} and {settings['learning_rate'] * settings['drop_to']:g} from "
         f"{100 * settings['drop_at']:g} % on, smoothness {settings['loss']['smoothness']:g}, seed "
         f"{settings['seed']}, the same pose network, the same start of encoder and pose network. One network "
-        "learns both scenes. The paper's smoothness is 0.04. Errors are median-scaled per picture, depth up to 80 m, at 640x480.",
+        "learns both scenes. The paper's smoothness is 0.04. Errors are median-scaled per picture, depth up "
+        "to 80 m, at 640x480.",
         "",
         *_table_3(results),
         *_ablation(results),
