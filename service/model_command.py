@@ -105,6 +105,9 @@ def _print_summary(path: Path, model: DepthModel, inference: InferenceSession) -
         "output": f"{card.output}, {'metric' if card.metric else 'not metric'}, "
         f"{'with' if card.uncertainty else 'without'} uncertainty",
         "trained on": card.training_data,
+        "effort": card.effort,
+        "made for": card.intended_use,
+        "limits": card.limits,
         "licence": card.licence,
         "runs on": f"{model.provider} ({model.precision})",
     }

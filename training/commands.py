@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from training.errors import EvaluationError
+from training.errors import EvaluationError, ExportError
 from training.evaluation_command import evaluate
 from training.extras import needs_extra
 from training.train_command import train
@@ -30,6 +30,9 @@ def export(
         Path | None,
         typer.Option(help="Result of `uavdepth evaluate --json` whose errors go into the card."),
     ] = None,
+    size: Annotated[
+        str | None, typer.Option(help="Input as WIDTHxHEIGHT; that of the run's last phase if not given.")
+    ] = None,
 ) -> None:
     """Write a trained network as ONNX with its card.
 
@@ -40,11 +43,21 @@ def export(
         from training.export import export_checkpoint
 
     errors = _measured_errors(measured) if measured is not None else {}
-    card = export_checkpoint(Checkpoint.load(checkpoint), output, name, errors)
+    card = export_checkpoint(Checkpoint.load(checkpoint), output, name, errors, _parsed_size(size))
     typer.echo(
         f"{output}: {card.name}, {card.input_width}x{card.input_height}, "
         f"{output.stat().st_size / 1e6:.1f} MB, checked against PyTorch"
     )
+
+
+def _parsed_size(text: str | None) -> tuple[int, int] | None:
+    """(640, 320) of "640x320". Raises ExportError."""
+    if text is None:
+        return None
+    width, _, height = text.lower().partition("x")
+    if not all(side.isascii() and side.isdigit() for side in (width, height)):
+        raise ExportError(f"size is {text!r}: WIDTHxHEIGHT is needed, as 640x320")
+    return int(width), int(height)
 
 
 def _measured_errors(path: Path) -> dict[str, Any]:

@@ -34,6 +34,16 @@ LARGEST_DIFFERENCE = 1e-3
 
 LICENCE = "Apache-2.0"
 
+INTENDED_USE = (
+    "Distances of obstacles 2 to 20 m ahead of a slow drone, from a calibrated camera of 60 to 110 degrees, "
+    "1 to 60 m above ground, pitch and roll to 30 degrees, with the ground's hint and measured points where "
+    "they are known; as an aid beside a pilot."
+)
+LIMITS = (
+    "Taught by rendered pictures alone. Without hints its metres are a guess. Thin things (wires, twigs), "
+    "glass, water, night and fog are missed or misjudged. It says its doubt as sigma: heed it."
+)
+
 EXPORT_SIZES = ((384, 192), (640, 320))
 """Width and height of the files that ship."""
 
@@ -120,9 +130,14 @@ def make_card(
         max_depth_m=MAX_DEPTH_M,
         training_data=(
             f"{checkpoint.frames} rendered frames with exact depth of {checkpoint.worlds} worlds of "
-            f"uavdepth.scenes, {checkpoint.images} pictures shown; encoder EfficientNet-Lite0 from ImageNet "
-            "weights (Apache-2.0)"
+            "uavdepth.scenes; encoder EfficientNet-Lite0 from ImageNet weights (Apache-2.0)"
         ),
+        effort=(
+            f"{checkpoint.images} pictures in {checkpoint.step} steps, {checkpoint.trained_s / 3600:.1f} "
+            "hours; runs that it started from not counted"
+        ),
+        intended_use=INTENDED_USE,
+        limits=LIMITS,
         licence=LICENCE,
         measured=dict(measured),
         created=datetime.now(UTC).isoformat(timespec="seconds"),

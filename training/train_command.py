@@ -30,7 +30,9 @@ def train(
     seeds: Annotated[
         int, typer.Option(min=1, max=900, help="How many worlds of each scene to render, from seed 0.")
     ] = 60,
-    scenes: Annotated[str, typer.Option(help="Scenes to render, by commas.")] = "city,mountain,forest,wall",
+    scenes: Annotated[str, typer.Option(help="Scenes to render, by commas.")] = (
+        "city,suburb,park,mountain,forest,wall"
+    ),
     frames_per_seed: Annotated[int, typer.Option(min=1, help="Frames rendered of each world.")] = 24,
     minutes: Annotated[
         float | None,

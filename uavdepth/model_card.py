@@ -120,7 +120,10 @@ class ModelCard(BaseModel):
         default=None, description="Depth beyond which the network was not trained; not for relative kinds."
     )
     training_data: Text = Field(default="unknown", description="What it was trained on.")
+    effort: Text = Field(default="unknown", description="Steps, pictures and hours of its training.")
     licence: Text = Field(default="unknown", description="Licence of the weights.")
+    intended_use: Text = Field(default="unknown", description="What it was made for.")
+    limits: Text = Field(default="unknown", description="What it cannot do, or nobody has tried.")
     measured: dict[str, JsonValue] = Field(
         default_factory=dict, description="Errors measured on data it was not trained on."
     )

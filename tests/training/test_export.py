@@ -70,7 +70,7 @@ def test_the_card_says_what_the_file_is(checkpoint: Checkpoint, exported: Path) 
     assert (card.output, card.metric, card.uncertainty) == ("log_inverse_depth", True, True)
     assert card.max_depth_m == MAX_DEPTH_M
     assert card.measured == {"median_scaled": {"abs_rel": 0.25}}
-    assert f"{checkpoint.images} pictures" in card.training_data
+    assert f"{checkpoint.images} pictures" in card.effort
 
 
 def some_hints(camera: CameraModel) -> Hints:
