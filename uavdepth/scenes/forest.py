@@ -14,7 +14,7 @@ from uavdepth.scenes.groves import add_tree_wall, tree_template
 from uavdepth.scenes.mesh import MeshBuilder
 from uavdepth.scenes.rocks import add_boulder
 from uavdepth.scenes.shapes import box_uv, grid_faces
-from uavdepth.scenes.terrain import LandNoise, Values, fractal_land, stretched_axis
+from uavdepth.scenes.terrain import LandNoise, Values, fractal_land, level_ground, stretched_axis
 from uavdepth.scenes.undergrowth import add_bush, add_log, add_tuft
 from uavdepth.scenes.vegetation import TreeKind, add_far_tree
 from uavdepth.scenes.weather import draw_weather
@@ -107,11 +107,7 @@ def build(seed: int) -> SceneDescription:
     _add_undergrowth(builder, rng, wood, wall_north_m)
     _add_far_trees(builder, rng, wood)
     weather = draw_weather(rng, (0.001, 0.009))
-    return weather.over(builder.build(), _flat, _EXTENT_M)
-
-
-def _flat(north_m: ArrayLike, east_m: ArrayLike) -> Values:
-    return np.zeros(np.broadcast(north_m, east_m).shape)
+    return weather.over(builder.build(), level_ground, _EXTENT_M)
 
 
 def _trail_east_m(bends: LandNoise, north_m: ArrayLike) -> Values:

@@ -77,6 +77,11 @@ def fractal_land(
     return total / strength
 
 
+def level_ground(north_m: ArrayLike, east_m: ArrayLike) -> Values:
+    """Height 0 everywhere."""
+    return np.zeros(np.broadcast(north_m, east_m).shape)
+
+
 def smooth_step(values: ArrayLike, low: ArrayLike, high: ArrayLike) -> Values:
     """0 below `low`, 1 above `high`, and between them a rise without kinks."""
     t = np.clip((np.asarray(values, float) - low) / (np.asarray(high, float) - low), 0.0, 1.0)

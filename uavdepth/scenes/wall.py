@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from uavdepth.scenes.cars import CarPark
 from uavdepth.scenes.corridor import Corridor
@@ -14,6 +13,7 @@ from uavdepth.scenes.overhead import add_line, add_mast
 from uavdepth.scenes.people import Crowd
 from uavdepth.scenes.solids import Rect, add_box, add_slab
 from uavdepth.scenes.street_furniture import add_lamp, add_sign, add_small_thing
+from uavdepth.scenes.terrain import level_ground
 from uavdepth.scenes.undergrowth import add_bush
 from uavdepth.scenes.vegetation import add_tree
 from uavdepth.scenes.weather import draw_weather
@@ -49,11 +49,7 @@ def build(seed: int) -> SceneDescription:
     _add_things(builder, rng, north_m)
     _add_thin_things(builder, seed, north_m)
     weather = draw_weather(rng, (0.0005, 0.006))
-    return weather.over(builder.build(), _flat, _HALF_M - 15.0)
-
-
-def _flat(north_m: ArrayLike, east_m: ArrayLike) -> NDArray[np.float64]:
-    return np.zeros(np.broadcast(north_m, east_m).shape)
+    return weather.over(builder.build(), level_ground, _HALF_M - 15.0)
 
 
 def _add_things(builder: MeshBuilder, rng: np.random.Generator, wall_m: float) -> None:

@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from uavdepth.scenes.bars import add_wires
 from uavdepth.scenes.cars import PAINTS_BGR, CarPark
@@ -33,6 +32,7 @@ from uavdepth.scenes.plant_parts import (
 from uavdepth.scenes.scaffolding import add_scaffold
 from uavdepth.scenes.solids import Rect, add_box, add_slab
 from uavdepth.scenes.stamps import Stamps
+from uavdepth.scenes.terrain import level_ground
 from uavdepth.scenes.weather import draw_weather
 
 _CELL_M, _ROAD_M = 30.0, 9.0
@@ -77,11 +77,7 @@ def build(seed: int) -> SceneDescription:
     _add_movers(yard)
     _add_border(yard)
     weather = draw_weather(rng, (0.0006, 0.007))
-    return weather.over(builder.build(), _flat, _REACH_M - 15.0)
-
-
-def _flat(north_m: ArrayLike, east_m: ArrayLike) -> NDArray[np.float64]:
-    return np.zeros(np.broadcast(north_m, east_m).shape)
+    return weather.over(builder.build(), level_ground, _REACH_M - 15.0)
 
 
 def _overlap(first: Rect, second: Rect) -> bool:
