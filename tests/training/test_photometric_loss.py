@@ -112,6 +112,13 @@ def test_rounding_in_a_flat_picture_teaches_nothing(level: float) -> None:
     assert not bool(terms.auto_mask.any())
 
 
+def test_next_to_no_motion_is_no_explanation() -> None:
+    """A source that is warped to where it was differs from itself by rounding, which must not teach."""
+    speck = STILL + 1e-7
+    terms = loss_of(random_disparities(2), picture(1), [picture(2), picture(3)], [speck, speck])
+    assert not bool(terms.auto_mask.any())
+
+
 def test_what_moves_with_the_camera_is_masked_and_the_rest_teaches() -> None:
     """The right half of the picture stays as it is (a rotor guard), the left half shifts by two pixels."""
     target = picture(1)
@@ -208,6 +215,14 @@ def test_a_batch_costs_the_mean_of_its_pictures() -> None:
         for k in range(2)
     ]
     torch.testing.assert_close(both, (alone[0] + alone[1]) / 2)
+
+
+def test_transforms_in_double_precision_are_welcome() -> None:
+    disparities, pose = random_disparities(1), STILL + 0.02
+    single = loss_of(disparities, picture(1), [picture(2)], [pose]).total.detach()
+    double = loss_of(disparities, picture(1), [picture(2)], [pose.double()]).total.detach()
+    assert double.dtype == torch.float32
+    torch.testing.assert_close(double, single, rtol=1e-4, atol=0)
 
 
 def test_autocast_does_not_change_the_loss() -> None:

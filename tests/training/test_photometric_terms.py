@@ -129,7 +129,7 @@ def explain(
     height, width = size
     target, neighbours = noise(2, 3, height, width).to(dtype), noise(sources, 2, 3, height, width).to(dtype)
     inverse_depth = (noise(2, 1, height, width, seed=1) + 0.05).to(dtype).requires_grad_()
-    pose = (0.3 * noise(sources, 2, 6, seed=2)).to(dtype).requires_grad_()
+    pose = (0.6 * noise(sources, 2, 6, seed=2) - 0.3).to(dtype).requires_grad_()
     camera = torch.tensor([[9.0, 0.0, 6.0], [0.0, 8.0, 5.0], [0.0, 0.0, 1.0]], dtype=dtype).expand(2, 3, 3)
     motion = torch.stack([pixel_motion(camera, transform_from_pose(each)) for each in pose])
     limit = unwarped_error(target, neighbours, ALPHA, minimum) if masked else None

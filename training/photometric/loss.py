@@ -96,7 +96,7 @@ def photometric_loss(
     with torch.autocast(target.device.type, enabled=False):
         target = target.detach().float().contiguous()
         neighbours = torch.stack([source.detach().float() for source in sources]).contiguous()
-        motion = torch.stack([pixel_motion(intrinsics.float(), each) for each in source_from_target])
+        motion = torch.stack([pixel_motion(intrinsics, each).float() for each in source_from_target])
         unwarped = None
         if settings.auto_mask:
             unwarped = unwarped_error(target, neighbours, settings.alpha, settings.minimum) - TIE
