@@ -84,9 +84,9 @@ def measure_frame(sources: Sources, item: EvaluationFrame) -> MeasuredFrame:
         if answer.metric:
             reported = scanner.scan(answer.depth_m, knowledge.attitude, knowledge.height_m)
             elements = compare_scans(truth, reported)
-        errors = compare(scored, answer, elements)
-        if errors is not None:
-            found[label] = errors
+        compared = compare(scored, answer, elements)
+        if compared is not None:
+            found[label] = compared
     errors = FrameErrors(
         item.scene, f"{item.scene}:{item.seed} #{item.index}", point_counts(knowledge), found
     )

@@ -19,8 +19,8 @@ from service.frame import Frame
 from service.pipeline import PerceptionResult, unknown_scan
 from service.publisher.publisher import ZenohPublisher
 from service.publisher.session import open_session
-from service.scale_status import ScaleStatus
 from service.publisher.wire import CameraHeader, DepthHeader, ScanSample, StatusSample
+from service.scale_status import ScaleStatus
 from service.settings import Settings
 from service.telemetry import Telemetry
 from service.trouble import Trouble
