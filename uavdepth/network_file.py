@@ -157,7 +157,7 @@ def _inputs_that_do_not_fit(card: ModelCard, inputs: dict[str, Any]) -> Iterator
             isinstance(size, int) for size, want in zip(shape, wanted, strict=True) if isinstance(want, str)
         ):
             yield Problem(
-                f"the card's multiple_of says that the size is free: {wanted}; the network's input is {shape}",
+                f"the card's multiple_of says that the size is free: {wanted}, the network's is {shape}",
                 "take multiple_of out and set input_width and input_height to that size, or correct layout",
             )
     if card.multiple_of is not None:

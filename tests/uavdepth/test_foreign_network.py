@@ -226,7 +226,7 @@ class TestDepthAnything:
         [
             ({"input_width": 150}, "input_width is 150, no multiple of 14"),
             ({"output_name": "depth"}, "output_name is 'depth'"),
-            ({"layout": "nhwc"}, r"free: \[1, 'height', 'width', 3\]; the network's input is \[1, 3,"),
+            ({"layout": "nhwc"}, r"free: \[1, 'height', 'width', 3\], the network's is \[1, 3,"),
         ],
     )
     def test_a_wrong_card_is_refused_before_it_flies(self, tmp_path, changes, text):
