@@ -58,6 +58,12 @@ COMMANDS = {
     "train-video": Command(
         "training.selfsupervised.command", "train_video", "Train depth from video alone.", "train"
     ),
+    "evaluate-video": Command(
+        "training.selfsupervised.evaluate_command",
+        "evaluate_video",
+        "Measure what video has taught.",
+        "train",
+    ),
     "networks": Command(
         "training.networks_command", "networks", "Parameters and operations of every network.", "train"
     ),

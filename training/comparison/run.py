@@ -17,11 +17,11 @@ from training.data.flight_sets import COMPARISON_SETS, write_flight_set
 from training.encoder_distillation import EncoderDistillation
 from training.errors import CheckpointError
 from training.evaluation_report import machine_text
-from training.networks.catalogue import build_network
 from training.networks.counting import count_multiply_adds, count_parameters
 from training.selfsupervised import command
 from training.selfsupervised.frames import open_triplets
 from training.selfsupervised.run_state import RunState
+from training.selfsupervised.trained_network import trained_network
 from training.selfsupervised.trainer import SelfSupervisedTrainer
 from training.sequence_evaluation import evaluate_disparity_network
 from training.sequences.airsim import open_airsim
@@ -91,11 +91,7 @@ def measure_run(folder: Path, data: Path) -> ComparisonResult:
         raise CheckpointError(
             f"{checkpoint} stands at {state.images} of {settings.image_steps} pictures: it is not finished"
         )
-    network = build_network(settings.network.name, settings.network.encoder, pretrained=False)
-    prefix = "depth."
-    network.load_state_dict(
-        {key.removeprefix(prefix): v for key, v in state.networks.items() if key.startswith(prefix)}
-    )
+    network = trained_network(state)
     scenes = {
         scene: evaluate_disparity_network(
             network,
