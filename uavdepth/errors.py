@@ -17,6 +17,10 @@ class ImageSizeError(UavDepthError, ValueError):
     """An image or depth map whose size is not the camera's."""
 
 
+class CalibrationError(UavDepthError, ValueError):
+    """A board, pictures or a solution from which no camera can be calibrated."""
+
+
 class ModelCardError(UavDepthError, ValueError):
     """A network file without a card, or with a card that lacks a key or holds an impossible value.
 
