@@ -8,14 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from uavdepth.autopilot_profile import ARDUPILOT, AutopilotProfile
 from uavdepth.errors import ScanError
-from uavdepth.obstacle_scan import (
-    FIRST_BEARING_DEG,
-    SECTOR_COUNT,
-    SECTOR_WIDTH_DEG,
-    ObstacleScan,
-    SectorState,
-)
+from uavdepth.obstacle_scan import SECTOR_COUNT, ObstacleScan, SectorState
 
 if TYPE_CHECKING:
     from pymavlink.dialects.v20.ardupilotmega import MAVLink_obstacle_distance_message
@@ -33,8 +28,8 @@ LARGEST_MAX_CM = 60_000
 """Keeps max + 1 ("clear") away from 65534, which ArduPilot and PX4 read differently, and from 65535."""
 
 
-def obstacle_words(scan: ObstacleScan) -> NDArray[np.uint16]:
-    """The 72 distances of the message, in centimetres and special values.
+def obstacle_words(scan: ObstacleScan, profile: AutopilotProfile = ARDUPILOT) -> NDArray[np.uint16]:
+    """The 72 distances of the message in the profile's layout, in centimetres and special values.
 
     An obstacle is min + 1 to max - 1, rounded down; nearer ones are raised to min + 1, because at or
     below min ArduPilot drops them and PX4 v1.18's set point becomes NaN (measured). Clear, and an
@@ -62,17 +57,21 @@ def obstacle_words(scan: ObstacleScan) -> NDArray[np.uint16]:
     words = np.full(SECTOR_COUNT, UNKNOWN_WORD, dtype=np.uint16)
     words[obstacle] = np.clip(centimetres[obstacle], min_cm + 1, max_cm - 1).astype(np.uint16)
     words[clear] = max_cm + 1
-    return words
+    return profile.merge(words, max_cm + 1)
 
 
-def encode_obstacle_distance(scan: ObstacleScan, time_usec: int = 0) -> MAVLink_obstacle_distance_message:
-    """OBSTACLE_DISTANCE for ArduPilot and PX4 from 1.18 on, in the one layout that is safe on both.
+def encode_obstacle_distance(
+    scan: ObstacleScan, time_usec: int = 0, profile: AutopilotProfile = ARDUPILOT
+) -> MAVLink_obstacle_distance_message:
+    """OBSTACLE_DISTANCE in body FRD, in the layout that the autopilot reads without loss.
 
-    72 elements of 5 degrees from -155, body FRD. No float in it can be NaN or infinite.
+    No float in it can be NaN or infinite.
 
     Args:
         scan: what stands round the vehicle.
         time_usec: capture time on the autopilot's clock in microseconds, 0 where it is not known.
+        profile: the autopilot's layout; the default, 72 elements of 5 degrees from -155, is safe on
+            ArduPilot and on PX4 from 1.18 on.
 
     Raises:
         ScanError: see `obstacle_words`; a time that is negative or does not fit 64 bits.
@@ -86,12 +85,12 @@ def encode_obstacle_distance(scan: ObstacleScan, time_usec: int = 0) -> MAVLink_
     return MAVLink_obstacle_distance_message(
         time_usec=int(time_usec),
         sensor_type=MAV_DISTANCE_SENSOR_UNKNOWN,
-        distances=[int(word) for word in obstacle_words(scan)],
-        increment=int(SECTOR_WIDTH_DEG),
+        distances=[int(word) for word in obstacle_words(scan, profile)],
+        increment=int(profile.increment_deg),
         min_distance=min_cm,
         max_distance=max_cm,
-        increment_f=SECTOR_WIDTH_DEG,
-        angle_offset=FIRST_BEARING_DEG,
+        increment_f=profile.increment_deg,
+        angle_offset=profile.first_bearing_deg,
         frame=MAV_FRAME_BODY_FRD,
     )
 

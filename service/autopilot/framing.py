@@ -11,6 +11,7 @@ MESSAGE_IDS = frozenset(
         mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
         mavlink.MAVLINK_MSG_ID_TIMESYNC,
         mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR,
+        mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
     }
 )
 """Messages that the link reads; the others are counted as bytes and skipped undecoded."""

@@ -16,6 +16,7 @@ class LinkStatus:
         line_open: socket or port is open, whoever is at the other end.
         system_id: the vehicle's, or None before it was learnt.
         autopilot: "ardupilot", "px4", ... or None.
+        profile: layout of OBSTACLE_DISTANCE that is sent: "ardupilot", "px4", "px4-legacy", or None.
         mode, armed: by the newest HEARTBEAT, or None.
         heartbeat_age_s: seconds since it, or None.
         mavlink1_seen: the autopilot speaks MAVLink 1 now, in which there is no OBSTACLE_DISTANCE.
@@ -38,6 +39,7 @@ class LinkStatus:
     line_open: bool = False
     system_id: int | None = None
     autopilot: str | None = None
+    profile: str | None = None
     mode: str | None = None
     armed: bool | None = None
     heartbeat_age_s: float | None = None

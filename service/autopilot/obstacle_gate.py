@@ -13,6 +13,7 @@ class Refusal(Enum):
     NOT_NEW = "not_new"
     TOO_SOON = "too_soon"
     CONGESTED = "congested"
+    LIMITS_CHANGED = "limits_changed"
 
 
 class ObstacleGate:

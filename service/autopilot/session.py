@@ -15,6 +15,7 @@ from service.autopilot.notices import Notice, Notices, Problem
 from service.autopilot.obstacle_gate import ObstacleGate, Refusal
 from service.autopilot.outbox import Outbox
 from service.autopilot.presence import Presence
+from service.autopilot.profile_choice import ProfileChoice
 from service.autopilot.rate_meter import RateMeter
 from service.autopilot.service_state import ServiceState
 from service.autopilot.status_text import StatusTexts
@@ -59,6 +60,8 @@ class LinkSession:
         self._timesync = TimeSync(round(1e9 / settings.timesync_rate_hz))
         self._presence = Presence()
         self._texts = StatusTexts()
+        self._choice = ProfileChoice(settings.profile)
+        self._limits_m: tuple[float, float] | None = None
         self._gate = ObstacleGate(settings.obstacle_rate_hz, round(settings.max_frame_age_s * 1e9))
         self._outbox = Outbox()
         self._outbox.set_system_id(settings.system_id or 1)
@@ -139,10 +142,11 @@ class LinkSession:
             self._tracker.on_range(message)
         elif name == "TIMESYNC":
             self._on_timesync(message, arrival_ns)
+        elif name == "AUTOPILOT_VERSION" and self._choice.on_version(message):
+            self._tell_profile()
         self._streams.on_message(name, arrival_ns)
         if self._tracker.reboots != reboots:
-            self._streams.restart()
-            self._timesync.restart()
+            self._ask_again()
             self._notices.news("the autopilot has rebooted: asking for its messages again")
         elif self._tracker.clock.steps != steps:
             self._timesync.restart()
@@ -165,14 +169,28 @@ class LinkSession:
                 self._tracker.forget()
             self._heard_ns = None
             self._outbox.set_system_id(vehicle.system_id)
+            self._choice.on_vehicle(vehicle.autopilot)
             self._notices.news(f"autopilot heard: {vehicle.autopilot}, system {vehicle.system_id}")
+            self._tell_profile()
 
     def _on_vehicle_back(self, arrival_ns: int) -> None:
         """The first word of the vehicle, or the first after a silence."""
-        self._streams.restart()
-        self._timesync.restart()
+        self._ask_again()
         if self._heard_ns is not None:
             self._notices.news(f"autopilot is back after {(arrival_ns - self._heard_ns) / 1e9:.1f} s")
+
+    def _ask_again(self) -> None:
+        self._streams.restart()
+        self._timesync.restart()
+        self._choice.restart()
+
+    def _tell_profile(self) -> None:
+        profile, version = self._choice.profile, self._choice.version
+        release = "" if version is None else " for version " + ".".join(map(str, version))
+        self._notices.news(
+            f"obstacle profile {profile.name}{release}: {profile.element_count} elements of "
+            f"{profile.increment_deg:g} degrees"
+        )
 
     def _on_protocol(self, mavlink1: bool) -> None:
         self._mavlink1 = mavlink1
@@ -208,6 +226,9 @@ class LinkSession:
         request = self._timesync.request(now_ns)
         if request is not None:
             self._outbox.put(request, now_ns + _SHORT_LIVED_NS)
+        question = self._choice.request(vehicle.system_id, now_ns)
+        if question is not None:
+            self._outbox.put(question, now_ns + _SHORT_LIVED_NS)
         for text in self._texts.due(now_ns):
             self._outbox.put(text)
         self._watch_streams()
@@ -228,13 +249,17 @@ class LinkSession:
     ) -> bool:
         """Queue an OBSTACLE_DISTANCE for the frame captured at `captured_ns`, if it may be sent.
 
-        Each frame is sent at most once, while it is fresh, at the wanted rate. `congested` tells that the
-        line has not taken the earlier bytes yet.
+        Each frame is sent at most once, while it is fresh, at the wanted rate. The limits of the first scan
+        hold for the session: PX4 never accepts "clear" again after max was lowered (measured). `congested`
+        tells that the line has not taken the earlier bytes yet.
         """
+        limits_m = (scan.min_distance_m, scan.max_distance_m)
         if not self._is_connected(now_ns):
             refusal: Refusal | None = Refusal.NOT_CONNECTED
         elif congested:
             refusal = Refusal.CONGESTED
+        elif self._limits_m not in (None, limits_m):
+            refusal = Refusal.LIMITS_CHANGED
         else:
             refusal = self._gate.refusal(captured_ns, now_ns)
         if refusal is not None:
@@ -242,7 +267,8 @@ class LinkSession:
             return False
         time_usec = self._tracker.autopilot_us(captured_ns, now_ns)
         expires_ns = captured_ns + round(self._settings.max_frame_age_s * 1e9)
-        self._outbox.put(encode_obstacle_distance(scan, time_usec=time_usec), expires_ns)
+        self._outbox.put(encode_obstacle_distance(scan, time_usec, self._choice.profile), expires_ns)
+        self._limits_m = limits_m
         self._gate.passed(captured_ns, now_ns)
         return True
 
@@ -295,6 +321,7 @@ class LinkSession:
             clock_offset_s=clock.offset_ns / 1e9 if clock.offset_ns is not None else None,
             clock_width_s=clock.width_ns / 1e9 if clock.width_ns is not None else None,
             sent_obstacles=self._sent_obstacles,
+            profile=self._choice.profile.name if vehicle else None,
             obstacle_rate_hz=self._obstacle_meter.per_second(now_ns),
             refused_obstacles=dict(self._refused),
             bytes_in_per_s=self._in_meter.per_second(now_ns),

@@ -44,6 +44,7 @@ class ArduPilot(Controller):
     """
 
     autopilot = int(mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA)
+    version_word = 0x04080000  # 4.8.0, development
     modes: Mapping[str, int] = MappingProxyType(
         {"STABILIZE": 0, "ALT_HOLD": 2, "GUIDED": 4, "LOITER": 5, "LAND": 9, "BRAKE": 17}
     )

@@ -74,6 +74,9 @@ class Controller(ABC):
     autopilot: int
     """MAV_AUTOPILOT of the heartbeat."""
 
+    version_word: int
+    """AUTOPILOT_VERSION.flight_sw_version: major, minor, patch and kind of release, a byte each."""
+
     modes: Mapping[str, int]
     """custom_mode of each flight mode by name."""
 

@@ -45,6 +45,7 @@ class Px4(Controller):
     """
 
     autopilot = int(mavlink.MAV_AUTOPILOT_PX4)
+    version_word = 0x01120000  # 1.18.0, development
     modes: Mapping[str, int] = MappingProxyType(
         {
             "POSCTL": _mode(3),

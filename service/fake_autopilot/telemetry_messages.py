@@ -178,8 +178,7 @@ def _gps(controller: Controller, boot_s: float, unix_us: int) -> list[Any]:
 
 
 def autopilot_version(controller: Controller) -> Any:
-    """AUTOPILOT_VERSION: MAVLink 2, whole commands, position targets; version 0.0.0 as this is no real
-    autopilot."""
+    """AUTOPILOT_VERSION: MAVLink 2, whole commands, position targets; the version that is imitated."""
     capabilities = (
         mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
         | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
@@ -187,7 +186,7 @@ def autopilot_version(controller: Controller) -> Any:
     )
     nothing = [0] * 8
     return mavlink.MAVLink_autopilot_version_message(
-        capabilities, 0, 0, 0, 0, nothing, nothing, nothing, 0, 0, controller.system_id
+        capabilities, controller.version_word, 0, 0, 0, nothing, nothing, nothing, 0, 0, controller.system_id
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import Field, field_validator
 
 from service.autopilot.endpoint import parse_endpoint
@@ -24,6 +26,13 @@ class AutopilotSettings(Section):
         le=255,
         title="System id",
         description="Vehicle to listen to; 0 learns it from the first autopilot's HEARTBEAT.",
+    )
+    profile: Literal["auto", "ardupilot", "px4", "px4-legacy"] = Field(
+        default="auto",
+        title="Layout of OBSTACLE_DISTANCE",
+        description="`ardupilot` and `px4` (from 1.18): 72 elements of 5 degrees from -155; `px4-legacy` "
+        "(1.17 and older): 36 of 10 degrees from -180. `auto` takes it from the autopilot's HEARTBEAT and "
+        "version; a PX4 that has not told its version gets `px4-legacy`, which every version reads.",
     )
     obstacle_rate_hz: float = Field(
         default=15.0,
