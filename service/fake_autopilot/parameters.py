@@ -1,5 +1,5 @@
-"""The parameters that the fake autopilots have: those that its models read, with the autopilots' own
-names."""
+"""The parameters that the fake autopilots have, with the autopilots' own names: those that its models read,
+and a few that are only told to who asks."""
 
 from __future__ import annotations
 
@@ -12,16 +12,29 @@ ARDUPILOT_DEFAULTS: Mapping[str, float] = {
     "ARMING_SKIPCHK": 0,
     "AVOID_BACKUP_SPD": 0.75,
     "AVOID_BEHAVE": 1,
+    "AVOID_DIST_MAX": 5.0,
     "AVOID_ENABLE": 7,
     "AVOID_MARGIN": 2.0,
+    "GUID_OPTIONS": 0,
     "LOIT_SPEED_MS": 5.0,
     "MAV_SYSID": 1,
+    "OA_TYPE": 0,
+    "PRX1_MAX": 0,
+    "PRX1_MIN": 0,
+    "PRX1_ORIENT": 0,
     "PRX1_TYPE": 2,
     "PRX1_YAW_CORR": 0,
     "PRX_FILT": 0.25,
+    "PRX_IGN_GND": 0,
+    "PRX_LOG_RAW": 1,
+    "RNGFND1_ORIENT": 25,
     "RNGFND1_TYPE": 100,
 }
-"""As in the recorded flights: ArduCopter's own where those left them alone."""
+"""As in the recorded flights: ArduCopter's own where those left them alone.
+
+AVOID_DIST_MAX, GUID_OPTIONS, OA_TYPE, PRX1_MAX, PRX1_MIN, PRX1_ORIENT, PRX_IGN_GND, PRX_LOG_RAW and
+RNGFND1_ORIENT change nothing in the models.
+"""
 
 PX4_DEFAULTS: Mapping[str, float] = {
     "CP_DELAY": 0.4,

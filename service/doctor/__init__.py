@@ -1,0 +1,1 @@
+"""`uavdepth doctor`: why nothing would show or stop, in plain words, each with the fix."""

@@ -1,0 +1,122 @@
+"""`uavdepth doctor`."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from service.doctor.finding import Finding
+    from service.doctor.observation import Observation
+
+EXIT_FAILURE = 1
+
+
+def doctor(
+    config: Annotated[
+        Path | None, typer.Option("--config", "-c", help="TOML file; see `uavdepth config example`.")
+    ] = None,
+    autopilot: Annotated[
+        str | None,
+        typer.Option(help="Endpoint in place of `[autopilot] endpoint`, e.g. tcp:127.0.0.1:5760."),
+    ] = None,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Any other key; may be given many times."),
+    ] = None,
+    seconds: Annotated[
+        float, typer.Option(min=1.0, max=300.0, help="How long to listen once the autopilot is heard.")
+    ] = 8.0,
+    latency_s: Annotated[
+        float | None,
+        typer.Option(
+            "--latency",
+            min=0.0,
+            max=5.0,
+            help="Measured capture-to-wire latency, seconds (`uavdepth watch`).",
+        ),
+    ] = None,
+    range_m: Annotated[
+        float | None,
+        typer.Option("--range", min=1.0, max=100.0, help="Range to trust, metres, if below [scan]'s."),
+    ] = None,
+    probe: Annotated[
+        bool,
+        typer.Option(
+            help="Send some empty obstacle messages to a disarmed ArduPilot, to see whether it takes them. "
+            "An armed vehicle never gets any."
+        ),
+    ] = True,
+    as_json: Annotated[bool, typer.Option("--json", help="JSON instead of a table.")] = False,
+    fix: Annotated[
+        Path | None,
+        typer.Option(help="Write the recommended parameters to this new file; the vehicle is never changed."),
+    ] = None,
+) -> None:
+    """Say why obstacles would not show or not stop the vehicle, each with the fix.
+
+    It listens to the autopilot, asks for message rates as `run` does, and reads parameters. Exit codes: 0 no
+    failure (there may be warnings), 1 a failure, 2 a wrong configuration or command line.
+    """
+    from service.clock import MonotonicClock
+    from service.doctor.checks import examine
+    from service.doctor.examination import Examination, plan_of
+    from service.doctor.finding import has_failure
+    from service.doctor.listen import listen
+    from service.doctor.report import report_json, report_table
+    from service.errors import ConfigError
+    from service.settings.load import load_settings
+
+    given = list(overrides or ())
+    if config is None:
+        given.insert(0, "camera.source=sim:wall")  # a camera must be named, though nothing here looks at it
+    if autopilot is not None:
+        given.append(f"autopilot.endpoint={autopilot}")
+    settings = load_settings(config, given)
+    if fix is not None and fix.exists():
+        raise ConfigError(f"--fix {fix}: exists already; give a new file")
+    scan = settings.scan
+    trusted_m = scan.max_distance_m if range_m is None else min(range_m, scan.max_distance_m)
+    plan = plan_of(settings.autopilot, scan.min_distance_m, trusted_m, latency_s)
+
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda _number, _frame: stop.set())
+    examination = Examination(settings.autopilot, plan, scan.max_distance_m, probe)
+    seen = listen(examination, settings.autopilot.endpoint, seconds, MonotonicClock(), stop)
+    findings = examine(seen, plan)
+
+    if as_json:
+        typer.echo(report_json(findings, seen))
+    else:
+        from rich.console import Console
+
+        Console().print(report_table(findings))
+    if fix is not None:
+        _write_fixes(fix, findings, seen)
+    if has_failure(findings):
+        raise typer.Exit(EXIT_FAILURE)
+
+
+def _write_fixes(path: Path, findings: list[Finding], seen: Observation) -> None:
+    """Write the parameter file, or say why there is none.
+
+    Raises:
+        ConfigError: the file cannot be written.
+    """
+    from service.doctor.parameter_file import parameter_file
+    from service.errors import ConfigError
+
+    if not seen.parameters:
+        typer.echo(f"{path}: not written, since no parameter could be read", err=True)
+        return
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(parameter_file(findings, seen))
+    except OSError as error:
+        raise ConfigError(f"--fix {path}: cannot be written: {error.strerror}") from error
+    typer.echo(f"{path}: written; load it with your ground station after reading it", err=True)
