@@ -5,6 +5,7 @@ from __future__ import annotations
 import select
 import socket
 import threading
+from pathlib import Path
 
 import structlog
 
@@ -12,6 +13,7 @@ from service.autopilot.endpoint import UdpListenEndpoint, parse_endpoint
 from service.autopilot.link_status import LinkStatus
 from service.autopilot.service_state import ServiceState
 from service.autopilot.session import LinkSession
+from service.autopilot.signing_key import load_signing_key
 from service.autopilot.transport import Transport, open_transport
 from service.autopilot.udp_transport import UdpListenTransport
 from service.clock import Clock
@@ -56,11 +58,14 @@ class AutopilotLink:
         """Begin. A silent or missing autopilot is no error: it is tried again and told in `status`.
 
         Raises:
-            LinkError: the endpoint is malformed, or the UDP port cannot be bound.
+            LinkError: the endpoint is malformed, the UDP port cannot be bound, or the signing key file
+                cannot be used.
         """
         if self._thread is not None:
             raise LinkError("the autopilot link has been started already")
         endpoint = parse_endpoint(self._settings.endpoint)
+        if self._settings.signing_key_file:
+            self._sign(Path(self._settings.signing_key_file).expanduser())
         if isinstance(endpoint, UdpListenEndpoint):
             try:
                 self._first_transport = open_transport(endpoint, self._clock)
@@ -126,6 +131,13 @@ class AutopilotLink:
         if self._thread is None or not self._thread.is_alive():
             self._wake_read.close()
             self._wake_write.close()
+
+    def _sign(self, path: Path) -> None:
+        key = load_signing_key(path)
+        if key.warning is not None:
+            _log.warning(key.warning)
+        with self._lock:
+            self._session.sign_with(key)
 
     def _wake(self) -> None:
         try:

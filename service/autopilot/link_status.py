@@ -30,6 +30,8 @@ class LinkStatus:
         refused_obstacles: scans that were not sent, by reason.
         bytes_in_per_s, bytes_out_per_s: over two seconds.
         bad_bytes: bytes that belonged to no MAVLink frame.
+        signed: our packets are signed, and only signed ones are believed.
+        refused_packets: packets that were not believed, by what was wrong with their signature.
         other_system_ids: other autopilots that were heard and not listened to.
         problem: what is wrong, fit to show a user; None if nothing is.
     """
@@ -57,5 +59,7 @@ class LinkStatus:
     bytes_in_per_s: float = 0.0
     bytes_out_per_s: float = 0.0
     bad_bytes: int = 0
+    signed: bool = False
+    refused_packets: Mapping[str, int] = field(default_factory=dict)
     other_system_ids: tuple[int, ...] = ()
     problem: str | None = None

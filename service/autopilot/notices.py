@@ -10,10 +10,11 @@ class Problem(IntEnum):
     """What can be wrong with the link, the worst first."""
 
     LINE = 1
-    SILENT = 2
-    MAVLINK1 = 3
-    STREAMS = 4
-    FOREIGN = 5
+    SIGNING = 2
+    SILENT = 3
+    MAVLINK1 = 4
+    STREAMS = 5
+    FOREIGN = 6
 
 
 @dataclass(frozen=True)

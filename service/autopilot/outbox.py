@@ -7,6 +7,7 @@ from collections import deque
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from service.autopilot.presence import COMPONENT_ID
+from service.autopilot.signing import Signing
 
 _MAX_FRAMES = 64
 
@@ -21,6 +22,10 @@ class Outbox:
     def set_system_id(self, system_id: int) -> None:
         """Send as this system from now on."""
         self._codec.srcSystem = system_id
+
+    def sign_with(self, signing: Signing) -> None:
+        """Sign every frame from now on."""
+        self._codec.signing = signing.state
 
     def put(self, message: mavlink.MAVLink_message, expires_ns: int | None = None) -> None:
         """Queue a message; the oldest is dropped when 64 wait.

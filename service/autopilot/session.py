@@ -18,11 +18,13 @@ from service.autopilot.presence import Presence
 from service.autopilot.profile_choice import ProfileChoice
 from service.autopilot.rate_meter import RateMeter
 from service.autopilot.service_state import ServiceState
+from service.autopilot.signing import Signing, Verdict, is_signed
+from service.autopilot.signing_key import SigningKey
 from service.autopilot.status_text import StatusTexts
 from service.autopilot.streams import StreamRequests, wanted_streams
 from service.autopilot.telemetry_tracker import TelemetryTracker
 from service.autopilot.timesync import TimeSync
-from service.autopilot.vehicle import Hearing, VehicleLearner
+from service.autopilot.vehicle import Hearing, VehicleLearner, could_be_autopilot
 from service.settings.autopilot import AutopilotSettings
 from service.telemetry import Telemetry
 from uavdepth.obstacle_message import encode_obstacle_distance
@@ -39,6 +41,18 @@ _MAVLINK1_TEXT = (
     "(ArduPilot) or MAV_PROTO_VER to 2 (PX4)"
 )
 
+_SIGNING_TEXTS = {
+    Verdict.UNSIGNED: "the autopilot's packets are not signed: set the key up there, or leave "
+    "signing_key_file empty",
+    Verdict.WRONG: "the autopilot's packets are signed with another key than the one in signing_key_file",
+    Verdict.OLD: "the autopilot's packets carry time stamps that were seen before: a replay, or its signing "
+    "clock was set back",
+}
+_KEY_MISSING_TEXT = (
+    "the autopilot signs its packets and signing_key_file is empty: it ignores ours on every link but the "
+    "first, without a word"
+)
+
 
 class LinkSession:
     """Bytes and their arrival times in; telemetry, and bytes to send, out.
@@ -48,9 +62,10 @@ class LinkSession:
 
     Args:
         settings: the `[autopilot]` section.
+        key: what packets are signed with; None for a link without signing.
     """
 
-    def __init__(self, settings: AutopilotSettings) -> None:
+    def __init__(self, settings: AutopilotSettings, key: SigningKey | None = None) -> None:
         self._settings = settings
         self._timeout_ns = round(settings.heartbeat_timeout_s * 1e9)
         self._learner = VehicleLearner(settings.system_id, self._timeout_ns)
@@ -65,6 +80,10 @@ class LinkSession:
         self._gate = ObstacleGate(settings.obstacle_rate_hz, round(settings.max_frame_age_s * 1e9))
         self._outbox = Outbox()
         self._outbox.set_system_id(settings.system_id or 1)
+        self._signing: Signing | None = None
+        self._refused_packets: Counter[str] = Counter()
+        if key is not None:
+            self.sign_with(key)
         self._notices = Notices()
         self._line_open = False
         self._opened_ns = 0
@@ -75,6 +94,11 @@ class LinkSession:
         self._sent_obstacles = 0
         self._refused: Counter[str] = Counter()
         self._obstacle_meter, self._in_meter, self._out_meter = RateMeter(), RateMeter(), RateMeter()
+
+    def sign_with(self, key: SigningKey) -> None:
+        """Sign what leaves from now on, and believe only what is signed with this key."""
+        self._signing = Signing(key)
+        self._outbox.sign_with(self._signing)
 
     # -- the line
 
@@ -125,6 +149,8 @@ class LinkSession:
 
     def _on_message(self, message: mavlink.MAVLink_message, arrival_ns: int, source: Hashable) -> None:
         name = message.get_type()
+        if self._signing is not None and not self._is_believed(self._signing, message, arrival_ns):
+            return
         if name == "HEARTBEAT":
             self._on_heartbeat(message, arrival_ns, source)
         if not self._learner.is_from_vehicle(message, source):
@@ -132,6 +158,7 @@ class LinkSession:
         if not self._is_connected(arrival_ns):
             self._on_vehicle_back(arrival_ns)
         self._heard_ns = arrival_ns
+        self._on_signature(message.get_msgbuf())
         self._on_protocol(is_mavlink1(message))
         reboots, steps = self._tracker.reboots, self._tracker.clock.steps
         if name == "ATTITUDE":
@@ -178,6 +205,26 @@ class LinkSession:
         self._ask_again()
         if self._heard_ns is not None:
             self._notices.news(f"autopilot is back after {(arrival_ns - self._heard_ns) / 1e9:.1f} s")
+
+    def _is_believed(self, signing: Signing, message: mavlink.MAVLink_message, arrival_ns: int) -> bool:
+        """Whether the signature is right; nothing else of a packet is looked at before."""
+        verdict = signing.verdict(message.get_msgbuf())
+        if verdict is Verdict.GOOD:
+            return True
+        self._refused_packets[verdict.value] += 1
+        # Said only while nothing good is heard, so that a forger cannot fill the log.
+        if could_be_autopilot(message) and not self._is_connected(arrival_ns):
+            self._notices.problem(Problem.SIGNING, _SIGNING_TEXTS[verdict])
+        return False
+
+    def _on_signature(self, frame: bytes | bytearray) -> None:
+        """A frame of the vehicle that is believed."""
+        if self._signing is not None:
+            self._signing.follow(frame)
+        elif is_signed(frame):
+            self._notices.problem(Problem.SIGNING, _KEY_MISSING_TEXT)
+            return
+        self._notices.over(Problem.SIGNING)
 
     def _ask_again(self) -> None:
         self._streams.restart()
@@ -327,6 +374,8 @@ class LinkSession:
             bytes_in_per_s=self._in_meter.per_second(now_ns),
             bytes_out_per_s=self._out_meter.per_second(now_ns),
             bad_bytes=self._bad_bytes,
+            signed=self._signing is not None,
+            refused_packets=dict(self._refused_packets),
             other_system_ids=tuple(sorted(self._learner.others)),
             problem=self._notices.standing,
         )

@@ -120,6 +120,11 @@ class VehicleLearner:
         return silent_ns >= (self._timeout_ns if system_id == vehicle.system_id else _REPLACED_AFTER_NS)
 
 
+def could_be_autopilot(message: mavlink.MAVLink_message) -> bool:
+    """Whether a message is the HEARTBEAT of an autopilot, as far as it says itself."""
+    return message.get_type() == "HEARTBEAT" and _is_autopilot(message)
+
+
 def _is_autopilot(heartbeat: mavlink.MAVLink_heartbeat_message) -> bool:
     return (
         heartbeat.get_srcSystem() != 0

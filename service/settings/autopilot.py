@@ -34,6 +34,13 @@ class AutopilotSettings(Section):
         "(1.17 and older): 36 of 10 degrees from -180. `auto` takes it from the autopilot's HEARTBEAT and "
         "version; a PX4 that has not told its version gets `px4-legacy`, which every version reads.",
     )
+    signing_key_file: str = Field(
+        default="",
+        title="MAVLink 2 signing key",
+        description="File of exactly 32 bytes, or of one line `passphrase: WORDS` (its SHA-256 is the key), "
+        "readable by this user only. With it every packet is signed, and unsigned or wrongly signed ones are "
+        "not believed. Empty: no signing.",
+    )
     obstacle_rate_hz: float = Field(
         default=15.0,
         ge=10.0,
