@@ -98,6 +98,29 @@ class CameraModel:
         """Intrinsics K, (3, 3)."""
         return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
 
+    def straightened(self, pixels: NDArray[np.floating]) -> NDArray[np.float64]:
+        """(N, 2) normalised x, y (times z-depth they are the point's) of (N, 2) pixels anywhere."""
+        flat = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+        if any(self.distortion) and len(flat):
+            return _undistorted(flat.reshape(-1, 1, 2), self).reshape(-1, 2)
+        return (flat - (self.cx, self.cy)) / (self.fx, self.fy)
+
+    def projected(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
+        """(N, 2) pixels of (N, 3) points in camera axes; NaN for those that are not in front."""
+        flat = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+        pixels = np.full((len(flat), 2), np.nan)
+        front = flat[:, 2] > 1e-6
+        if not front.any():
+            return pixels
+        if any(self.distortion):
+            seen, _ = cv2.projectPoints(
+                flat[front], np.zeros(3), np.zeros(3), self.matrix, np.array(self.distortion)
+            )
+            pixels[front] = seen.reshape(-1, 2)
+        else:
+            pixels[front] = flat[front, :2] / flat[front, 2:] * (self.fx, self.fy) + (self.cx, self.cy)
+        return pixels
+
     @cached_property
     def normalized_rays(self) -> NDArray[np.float32]:
         """(H, W, 3) float32 direction of each pixel centre with z = 1: times z-depth it is the point."""

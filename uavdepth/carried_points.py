@@ -1,0 +1,128 @@
+"""Points that were measured once, moved along with the vehicle."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uavdepth.camera import CameraModel, CameraMount
+from uavdepth.hints import PointHints
+from uavdepth.vehicle_motion import VehicleMotion
+
+MOST_POINTS = 300
+
+_GROWTH_PER_S = 0.04
+"""Relative sigma that a followed point gains in a second without a measurement."""
+
+_LOST_GROWTH_PER_S = 0.15
+"""The same for one that is not followed any more: what is at its pixel now may be another thing."""
+
+
+class CarriedPoints:
+    """Points in the camera axes of the newest picture, with when and how well they were measured.
+
+    Args:
+        camera: that sees them.
+        carry_s: how long a point lasts after it was measured, seconds.
+    """
+
+    def __init__(self, camera: CameraModel, carry_s: float) -> None:
+        self._camera = camera
+        self._carry_ns = round(carry_s * 1e9)
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all points."""
+        self._at_ns = 0
+        self._ids = np.empty(0, dtype=np.int64)
+        self._points = np.empty((0, 3))
+        self._sigma = np.empty(0)
+        self._offset_sigma = np.empty(0)
+        self._measured_ns = np.empty(0, dtype=np.int64)
+
+    def move(self, now_ns: int, motion: VehicleMotion, mount: CameraMount) -> None:
+        """Move all points into the camera's axes at `now_ns`; where the motion is not known they are lost."""
+        if len(self._ids):
+            moved = motion.between(self._at_ns, now_ns, mount)
+            if moved is None:
+                self.clear()
+            else:
+                self._points = (self._points + moved.offset_m) @ moved.rotation.T
+                # Errors of the velocity last, so those of the steps add up rather than average.
+                self._offset_sigma = self._offset_sigma + moved.sigma_m
+                self._keep(now_ns - self._measured_ns <= self._carry_ns)
+        self._at_ns = now_ns
+
+    def put(
+        self,
+        ids: NDArray[np.int64],
+        points: NDArray[np.float64],
+        relative_sigma: NDArray[np.float64],
+        now_ns: int,
+    ) -> None:
+        """Take measurements of the newest picture where they are better than what is carried.
+
+        Args:
+            ids: (N,) of their tracks.
+            points: (N, 3) in camera axes.
+            relative_sigma: (N,) of depth.
+            now_ns: time of the picture.
+        """
+        _, ours, theirs = np.intersect1d(self._ids, ids, assume_unique=True, return_indices=True)
+        carried = self._grown(now_ns, np.ones(len(self._ids), dtype=bool))[ours]
+        worse = relative_sigma[theirs] > carried
+        keep = np.ones(len(ids), dtype=bool)
+        keep[theirs[worse]] = False
+        replaced = np.ones(len(self._ids), dtype=bool)
+        replaced[ours[~worse]] = False
+        self._keep(replaced)
+        self._ids = np.concatenate([self._ids, ids[keep]])
+        self._points = np.concatenate([self._points, points[keep]])
+        self._sigma = np.concatenate([self._sigma, relative_sigma[keep]])
+        self._offset_sigma = np.concatenate([self._offset_sigma, np.zeros(np.count_nonzero(keep))])
+        self._measured_ns = np.concatenate([self._measured_ns, np.full(np.count_nonzero(keep), now_ns)])
+
+    def drop(self, ids: NDArray[np.int64]) -> None:
+        """Forget the points of these tracks."""
+        self._keep(~np.isin(self._ids, ids))
+
+    def hints(
+        self,
+        live_ids: NDArray[np.int64],
+        live_pixels: NDArray[np.float64],
+        now_ns: int,
+        largest_sigma: float,
+    ) -> PointHints:
+        """The points in the picture: at their track's pixel where it is followed, else where they should be.
+
+        Args:
+            live_ids, live_pixels: (N,) and (N, 2) of the live tracks, camera pixels.
+            now_ns: time of the picture, to which the points were moved.
+            largest_sigma: less certain ones are left out.
+        """
+        pixels = self._camera.projected(self._points)
+        _, ours, theirs = np.intersect1d(self._ids, live_ids, assume_unique=True, return_indices=True)
+        followed = np.zeros(len(self._ids), dtype=bool)
+        followed[ours] = True
+        pixels[ours] = live_pixels[theirs]
+        sigma = self._grown(now_ns, followed)
+        size = np.array([self._camera.width, self._camera.height])
+        with np.errstate(invalid="ignore"):
+            inside = np.all((pixels >= -0.5) & (pixels < size - 0.5), axis=1)
+        inside &= self._points[:, 2] > 0.3
+        self._keep(inside)
+        pixels, sigma = pixels[inside], sigma[inside]
+        order = np.argsort(sigma, kind="stable")[:MOST_POINTS]
+        order = order[sigma[order] <= largest_sigma]
+        chosen = pixels[order], self._points[order, 2], sigma[order]
+        return PointHints(*(values.astype(np.float32) for values in chosen))
+
+    def _grown(self, now_ns: int, followed: NDArray[np.bool_]) -> NDArray[np.float64]:
+        age_s = (now_ns - self._measured_ns) * 1e-9
+        growth = np.where(followed, _GROWTH_PER_S, _LOST_GROWTH_PER_S) * age_s
+        by_offset = self._offset_sigma / np.maximum(self._points[:, 2], 0.3)
+        return np.asarray(np.sqrt(self._sigma**2 + growth**2 + by_offset**2))
+
+    def _keep(self, kept: NDArray[np.bool_]) -> None:
+        for name in ("_ids", "_points", "_sigma", "_offset_sigma", "_measured_ns"):
+            setattr(self, name, getattr(self, name)[kept])

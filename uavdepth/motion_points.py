@@ -1,0 +1,211 @@
+"""Points of known depth from the vehicle's own motion: the live hints of a depth network."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from uavdepth.camera import CameraModel, CameraMount
+from uavdepth.carried_points import CarriedPoints
+from uavdepth.errors import ImageSizeError
+from uavdepth.feature_tracks import MOST_FRAMES, FeatureTracks
+from uavdepth.hints import PointHints
+from uavdepth.triangulation import triangulate
+from uavdepth.vehicle_motion import CameraMotion, VehicleMotion
+
+_TRACKING_WIDTH = 320
+"""Pictures are made smaller to about this width: corners are found to a fraction of a pixel all the same."""
+
+_LONGEST_GAP_NS = 500_000_000
+"""After a longer gap between two pictures the tracks begin anew."""
+
+_BASELINE_SIGMAS = 3.0
+"""In hover the baseline does not stand out of its own noise, and there is no depth."""
+
+_MOST_VIEWS = 6
+
+
+@dataclass(frozen=True)
+class MotionPointSettings:
+    """What a point must be to be believed.
+
+    Args:
+        pixel_sigma: standard deviation of a tracked corner, pixels of a picture 320 wide.
+        drift_sigma: what is added to it for each 10 pictures that a corner was followed.
+        least_views: pictures besides the newest that must have seen a point.
+        longest_window_s: oldest picture that is used.
+        least_parallax_rad: smallest angle between two rays to a point.
+        largest_sigma: largest relative standard deviation of depth.
+        largest_residual: largest re-projection error (root mean square), in standard deviations.
+        nearest_m, farthest_m: depths that are believed.
+        model_sigma: relative error of depth that noise does not explain: calibration, mount, time stamps.
+        carry_s: how long a point that is not measured any more is carried along.
+    """
+
+    pixel_sigma: float = 0.3
+    drift_sigma: float = 0.2
+    least_views: int = 2
+    longest_window_s: float = 1.5
+    least_parallax_rad: float = math.radians(0.6)
+    largest_sigma: float = 0.2
+    largest_residual: float = 2.5
+    nearest_m: float = 0.5
+    farthest_m: float = 80.0
+    model_sigma: float = 0.01
+    carry_s: float = 2.0
+
+
+class MotionPoints:
+    """Follows corners from picture to picture and measures their depth by the way the vehicle went.
+
+    Nothing comes of a hover but points that were measured before; of flight along the optical axis
+    nothing near the point it heads for. Objects that move are told by residuals across their epipolar
+    lines; one that moves along them (a car ahead on one's own course) is not told from a thing that
+    stands at another depth.
+
+    Args:
+        camera, mount: the camera and how it sits on the vehicle.
+        settings: what a point must be to be believed.
+    """
+
+    def __init__(
+        self, camera: CameraModel, mount: CameraMount, settings: MotionPointSettings | None = None
+    ) -> None:
+        self.camera = camera
+        self.mount = mount
+        self.settings = settings or MotionPointSettings()
+        shrink = max(1.0, camera.width / _TRACKING_WIDTH)
+        self._size = max(1, round(camera.width / shrink)), max(1, round(camera.height / shrink))
+        self._scale = np.array([camera.width / self._size[0], camera.height / self._size[1]])
+        self._tracks = FeatureTracks()
+        self._times: deque[int] = deque(maxlen=MOST_FRAMES)
+        self._carried = CarriedPoints(camera, self.settings.carry_s)
+        self._last = _no_points()
+
+    def clear(self) -> None:
+        """Forget all tracks and points."""
+        self._tracks.clear()
+        self._times.clear()
+        self._carried.clear()
+        self._last = _no_points()
+
+    def update(self, image_bgr: NDArray[np.uint8], captured_ns: int, motion: VehicleMotion) -> PointHints:
+        """Points of one picture.
+
+        Args:
+            image_bgr: (H, W, 3) uint8, the camera's size.
+            captured_ns: when it was taken, on the clock of `motion`. A step back in time begins anew; the
+                same time again gives the same points.
+            motion: what the autopilot said of the vehicle's motion, up to about that time.
+
+        Returns:
+            Up to 300 points. None at all where the motion at that time is not known.
+
+        Raises:
+            ImageSizeError: a picture that is not (H, W, 3) uint8 of the camera.
+        """
+        shape = (self.camera.height, self.camera.width, 3)
+        if image_bgr.shape != shape or image_bgr.dtype != np.uint8:
+            raise ImageSizeError(
+                f"the picture is {image_bgr.shape} {image_bgr.dtype}, the camera's is {shape} uint8"
+            )
+        if self._times:
+            gap_ns = captured_ns - self._times[-1]
+            if gap_ns == 0:
+                return self._last
+            if gap_ns < 0:
+                self.clear()
+            elif gap_ns > _LONGEST_GAP_NS:
+                self._tracks.clear()
+                self._times.clear()
+        self._follow(image_bgr, captured_ns, motion)
+        self._last = self._points(captured_ns, motion)
+        return self._last
+
+    def _follow(self, image_bgr: NDArray[np.uint8], captured_ns: int, motion: VehicleMotion) -> None:
+        small = cv2.resize(image_bgr, self._size, interpolation=cv2.INTER_AREA)
+        grey = np.asarray(cv2.cvtColor(small, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+        expected = None
+        if self._times and len(self._tracks.ids):
+            turn = motion.between(self._times[-1], captured_ns, self.mount)
+            if turn is not None:
+                rays = self._rays(self._tracks.positions[-1])
+                points = np.concatenate([rays, np.ones((len(rays), 1))], axis=1) @ turn.rotation.T
+                expected = self._small(self.camera.projected(points))
+        self._tracks.update(grey, expected)
+        self._times.append(captured_ns)
+
+    def _points(self, captured_ns: int, motion: VehicleMotion) -> PointHints:
+        if not motion.knows(captured_ns):
+            return _no_points()
+        ids, pixels = self._tracks.ids, self._pixels(self._tracks.positions[-1])
+        self._carried.move(captured_ns, motion, self.mount)
+        views = self._views(captured_ns, motion)
+        if views and len(ids):
+            self._measure(captured_ns, motion, views)
+        return self._carried.hints(ids, pixels, captured_ns, self.settings.largest_sigma)
+
+    def _views(self, captured_ns: int, motion: VehicleMotion) -> list[tuple[int, CameraMotion]]:
+        """Rows of earlier pictures to measure with, each twice as old as the next, and the motion to them."""
+        oldest_ns = captured_ns - round(self.settings.longest_window_s * 1e9)
+        rows = [row for row, at_ns in enumerate(self._times) if oldest_ns <= at_ns < captured_ns]
+        first = len(self._times) - len(self._tracks.positions)
+        if not rows or first != 0:
+            return []
+        wanted = np.unique(np.rint(np.geomspace(1, len(rows), _MOST_VIEWS)).astype(int))
+        chosen = []
+        for back in wanted:
+            row = rows[-back]
+            moved = motion.between(captured_ns, self._times[row], self.mount)
+            if moved is not None:
+                chosen.append((row, moved))
+        if any(moved.baseline_m > _BASELINE_SIGMAS * moved.sigma_m for _, moved in chosen):
+            return chosen
+        return []
+
+    def _measure(
+        self, captured_ns: int, motion: VehicleMotion, views: list[tuple[int, CameraMotion]]
+    ) -> None:
+        settings, positions = self.settings, self._tracks.positions
+        rows = [row for row, _ in views]
+        several = np.flatnonzero((~np.isnan(positions[rows][..., 0])).sum(axis=0) >= settings.least_views)
+        if not len(several):
+            return
+        rays = self._rays(positions[-1][several])
+        seen = self._rays(positions[rows][:, several].reshape(-1, 2)).reshape(len(rows), -1, 2)
+        # One pixel of the small picture, as an angle.
+        pixel = float(self._scale[0]) / self.camera.fx
+        steps = len(positions) - 1 - np.array(rows)
+        sigma = pixel * np.sqrt(settings.pixel_sigma**2 + settings.drift_sigma**2 * steps / 10)
+        found = triangulate(
+            rays, seen, [moved for _, moved in views], sigma, motion.noise, pixel * settings.pixel_sigma
+        )
+        relative = np.hypot(found.relative_sigma, settings.model_sigma)
+        good = relative <= settings.largest_sigma
+        good &= found.residual <= settings.largest_residual
+        good &= found.parallax_rad >= settings.least_parallax_rad
+        good &= (found.depth_m >= settings.nearest_m) & (found.depth_m <= settings.farthest_m)
+        rays = np.concatenate([rays, np.ones((len(rays), 1))], axis=1)
+        points = rays[good] * found.depth_m[good, None]
+        self._carried.put(self._tracks.ids[several[good]], points, relative[good], captured_ns)
+        # A track that does not fit a still world is not one of its points, whatever it was before.
+        self._carried.drop(self._tracks.ids[several[found.residual > settings.largest_residual]])
+
+    def _pixels(self, small: NDArray[np.float32]) -> NDArray[np.float64]:
+        return np.asarray((small.astype(np.float64) + 0.5) * self._scale - 0.5)
+
+    def _small(self, pixels: NDArray[np.float64]) -> NDArray[np.float32]:
+        return np.asarray((pixels + 0.5) / self._scale - 0.5, dtype=np.float32)
+
+    def _rays(self, small: NDArray[np.float32]) -> NDArray[np.float64]:
+        return self.camera.straightened(self._pixels(small))
+
+
+def _no_points() -> PointHints:
+    nothing = np.empty(0, dtype=np.float32)
+    return PointHints(nothing.reshape(0, 2), nothing, nothing)
