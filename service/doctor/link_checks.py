@@ -17,6 +17,11 @@ _MUCH_OF_THE_LINE = 0.7
 
 def check_heartbeat(seen: Observation, plan: Plan) -> list[Finding]:
     """Whether an autopilot is heard, and if not, where to look."""
+    if seen.autopilot is not None and seen.line_error is not None:
+        text = (
+            f"{seen.autopilot}, system {seen.system_id}, was heard, then the line was lost: {seen.line_error}"
+        )
+        return [Finding(Level.FAILURE, "heartbeat", text, _how_to_open(seen.endpoint))]
     if seen.autopilot is not None:
         version = "" if seen.version is None else " " + ".".join(map(str, seen.version))
         text = f"{seen.autopilot}{version}, system {seen.system_id}, is heard on {seen.endpoint}"
