@@ -25,8 +25,11 @@ class LinkStatus:
         clock_synced: round trips bind the autopilot's clock to ours.
         clock_offset_s: our clock minus the autopilot's, seconds, or None.
         clock_width_s: width of the bracket that the offset lies in, seconds, or None.
-        sent_obstacles: OBSTACLE_DISTANCE messages handed to the line.
+        sent_obstacles: scans handed to the line.
         obstacle_rate_hz: the same a second, over two seconds.
+        obstacle_rate_limit_hz: the most that is sent a second: what was wanted, or what the line carries.
+        byte_budget_per_s: bytes a second that the line may carry; 0 for no limit.
+        dropped_messages: messages that found no room on the line before they were too old.
         refused_obstacles: scans that were not sent, by reason.
         bytes_in_per_s, bytes_out_per_s: over two seconds.
         bad_bytes: bytes that belonged to no MAVLink frame.
@@ -55,6 +58,9 @@ class LinkStatus:
     clock_width_s: float | None = None
     sent_obstacles: int = 0
     obstacle_rate_hz: float = 0.0
+    obstacle_rate_limit_hz: float = 0.0
+    byte_budget_per_s: int = 0
+    dropped_messages: int = 0
     refused_obstacles: Mapping[str, int] = field(default_factory=dict)
     bytes_in_per_s: float = 0.0
     bytes_out_per_s: float = 0.0

@@ -13,8 +13,9 @@ class Problem(IntEnum):
     SIGNING = 2
     SILENT = 3
     MAVLINK1 = 4
-    STREAMS = 5
-    FOREIGN = 6
+    SLOW_LINE = 5
+    STREAMS = 6
+    FOREIGN = 7
 
 
 @dataclass(frozen=True)

@@ -8,49 +8,42 @@ from dataclasses import replace
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from service.autopilot.byte_budget import bytes_per_s_of
 from service.autopilot.framing import FrameReader, is_mavlink1
 from service.autopilot.link_status import LinkStatus
 from service.autopilot.motion_history import MotionLimits
 from service.autopilot.notices import Notice, Notices, Problem
-from service.autopilot.obstacle_gate import ObstacleGate, Refusal
+from service.autopilot.obstacle_gate import Refusal
+from service.autopilot.obstacle_sender import ObstacleSender
 from service.autopilot.outbox import Outbox
+from service.autopilot.packet_trust import PacketTrust
 from service.autopilot.presence import Presence
 from service.autopilot.profile_choice import ProfileChoice
 from service.autopilot.rate_meter import RateMeter
 from service.autopilot.service_state import ServiceState
-from service.autopilot.signing import Signing, Verdict, is_signed
+from service.autopilot.signing import Signing
 from service.autopilot.signing_key import SigningKey
 from service.autopilot.status_text import StatusTexts
 from service.autopilot.streams import StreamRequests, wanted_streams
 from service.autopilot.telemetry_tracker import TelemetryTracker
 from service.autopilot.timesync import TimeSync
-from service.autopilot.vehicle import Hearing, VehicleLearner, could_be_autopilot
+from service.autopilot.vehicle import Hearing, VehicleLearner
 from service.settings.autopilot import AutopilotSettings
 from service.telemetry import Telemetry
-from uavdepth.obstacle_message import encode_obstacle_distance
 from uavdepth.obstacle_scan import ObstacleScan
 
 _MAX_SOURCES = 8
 """Senders on a UDP port whose bytes are kept apart."""
 
 _SHORT_LIVED_NS = 1_000_000_000
-"""A HEARTBEAT or TIMESYNC that could not leave for a second is made anew."""
+"""A HEARTBEAT, TIMESYNC or request that could not leave for a second is made anew."""
+
+_TEXT_LIVES_NS = 10_000_000_000
+"""A text for the pilot has this long to find room on the line."""
 
 _MAVLINK1_TEXT = (
     "the autopilot speaks MAVLink 1, in which OBSTACLE_DISTANCE does not exist: set SERIALn_PROTOCOL to 2 "
     "(ArduPilot) or MAV_PROTO_VER to 2 (PX4)"
-)
-
-_SIGNING_TEXTS = {
-    Verdict.UNSIGNED: "the autopilot's packets are not signed: set the key up there, or leave "
-    "signing_key_file empty",
-    Verdict.WRONG: "the autopilot's packets are signed with another key than the one in signing_key_file",
-    Verdict.OLD: "the autopilot's packets carry time stamps that were seen before: a replay, or its signing "
-    "clock was set back",
-}
-_KEY_MISSING_TEXT = (
-    "the autopilot signs its packets and signing_key_file is empty: it ignores ours on every link but the "
-    "first, without a word"
 )
 
 
@@ -76,29 +69,27 @@ class LinkSession:
         self._presence = Presence()
         self._texts = StatusTexts()
         self._choice = ProfileChoice(settings.profile)
-        self._limits_m: tuple[float, float] | None = None
-        self._gate = ObstacleGate(settings.obstacle_rate_hz, round(settings.max_frame_age_s * 1e9))
-        self._outbox = Outbox()
+        self._bytes_per_s = bytes_per_s_of(settings.bytes_per_s, settings.endpoint)
+        self._sender = ObstacleSender(settings, self._bytes_per_s)
+        self._outbox = Outbox(self._bytes_per_s)
         self._outbox.set_system_id(settings.system_id or 1)
-        self._signing: Signing | None = None
-        self._refused_packets: Counter[str] = Counter()
+        self._notices = Notices()
+        self._trust = PacketTrust(self._notices)
         if key is not None:
             self.sign_with(key)
-        self._notices = Notices()
         self._line_open = False
         self._opened_ns = 0
         self._heard_ns: int | None = None
         self._mavlink1 = False
         self._bad_bytes = 0
         self._line_losses = 0
-        self._sent_obstacles = 0
         self._refused: Counter[str] = Counter()
         self._obstacle_meter, self._in_meter, self._out_meter = RateMeter(), RateMeter(), RateMeter()
 
     def sign_with(self, key: SigningKey) -> None:
         """Sign what leaves from now on, and believe only what is signed with this key."""
-        self._signing = Signing(key)
-        self._outbox.sign_with(self._signing)
+        self._trust.signing = Signing(key)
+        self._outbox.sign_with(self._trust.signing)
 
     # -- the line
 
@@ -112,6 +103,8 @@ class LinkSession:
         self._streams.restart()
         if self._notices.over(Problem.LINE):
             self._notices.news(f"autopilot line {self._settings.endpoint} is open")
+        if self._sender.complaint is not None:
+            self._notices.problem(Problem.SLOW_LINE, self._sender.complaint)
 
     def line_failed(self, reason: str) -> None:
         """The socket or port could not be opened, or was lost; it is being tried again."""
@@ -149,7 +142,7 @@ class LinkSession:
 
     def _on_message(self, message: mavlink.MAVLink_message, arrival_ns: int, source: Hashable) -> None:
         name = message.get_type()
-        if self._signing is not None and not self._is_believed(self._signing, message, arrival_ns):
+        if not self._trust.believes(message, self._is_connected(arrival_ns)):
             return
         if name == "HEARTBEAT":
             self._on_heartbeat(message, arrival_ns, source)
@@ -158,7 +151,7 @@ class LinkSession:
         if not self._is_connected(arrival_ns):
             self._on_vehicle_back(arrival_ns)
         self._heard_ns = arrival_ns
-        self._on_signature(message.get_msgbuf())
+        self._trust.on_vehicle(message)
         self._on_protocol(is_mavlink1(message))
         reboots, steps = self._tracker.reboots, self._tracker.clock.steps
         if name == "ATTITUDE":
@@ -206,26 +199,6 @@ class LinkSession:
         if self._heard_ns is not None:
             self._notices.news(f"autopilot is back after {(arrival_ns - self._heard_ns) / 1e9:.1f} s")
 
-    def _is_believed(self, signing: Signing, message: mavlink.MAVLink_message, arrival_ns: int) -> bool:
-        """Whether the signature is right; nothing else of a packet is looked at before."""
-        verdict = signing.verdict(message.get_msgbuf())
-        if verdict is Verdict.GOOD:
-            return True
-        self._refused_packets[verdict.value] += 1
-        # Said only while nothing good is heard, so that a forger cannot fill the log.
-        if could_be_autopilot(message) and not self._is_connected(arrival_ns):
-            self._notices.problem(Problem.SIGNING, _SIGNING_TEXTS[verdict])
-        return False
-
-    def _on_signature(self, frame: bytes | bytearray) -> None:
-        """A frame of the vehicle that is believed."""
-        if self._signing is not None:
-            self._signing.follow(frame)
-        elif is_signed(frame):
-            self._notices.problem(Problem.SIGNING, _KEY_MISSING_TEXT)
-            return
-        self._notices.over(Problem.SIGNING)
-
     def _ask_again(self) -> None:
         self._streams.restart()
         self._timesync.restart()
@@ -249,7 +222,7 @@ class LinkSession:
     def _on_timesync(self, message: mavlink.MAVLink_timesync_message, arrival_ns: int) -> None:
         answer = self._timesync.answer(message, arrival_ns)
         if answer is not None:
-            self._outbox.put(answer)
+            self._outbox.put(answer, arrival_ns + _SHORT_LIVED_NS)
             return
         trip = self._timesync.round_trip(message, arrival_ns)
         if trip is not None:
@@ -269,7 +242,7 @@ class LinkSession:
         if vehicle is None or not self._is_connected(now_ns):
             return
         for stream in self._streams.due(now_ns):
-            self._outbox.put(stream.request(vehicle.system_id))
+            self._outbox.put(stream.request(vehicle.system_id), now_ns + _SHORT_LIVED_NS)
         request = self._timesync.request(now_ns)
         if request is not None:
             self._outbox.put(request, now_ns + _SHORT_LIVED_NS)
@@ -277,18 +250,16 @@ class LinkSession:
         if question is not None:
             self._outbox.put(question, now_ns + _SHORT_LIVED_NS)
         for text in self._texts.due(now_ns):
-            self._outbox.put(text)
+            self._outbox.put(text, now_ns + _TEXT_LIVES_NS)
         self._watch_streams()
 
     def take_output(self, now_ns: int) -> list[bytes]:
         """Frames to write now, in order."""
-        frames = []
-        for message, frame in self._outbox.take(now_ns):
-            frames.append(frame)
-            self._out_meter.add(now_ns, len(frame))
-            if message.get_type() == "OBSTACLE_DISTANCE":
-                self._sent_obstacles += 1
-                self._obstacle_meter.add(now_ns)
+        sent_before = self._outbox.sent_obstacles
+        frames = [frame for _, frame in self._outbox.take(now_ns)]
+        if frames:
+            self._out_meter.add(now_ns, sum(map(len, frames)))
+            self._obstacle_meter.add(now_ns, self._outbox.sent_obstacles - sent_before)
         return frames
 
     def send_obstacles(
@@ -296,27 +267,22 @@ class LinkSession:
     ) -> bool:
         """Queue an OBSTACLE_DISTANCE for the frame captured at `captured_ns`, if it may be sent.
 
-        Each frame is sent at most once, while it is fresh, at the wanted rate. The limits of the first scan
-        hold for the session: PX4 never accepts "clear" again after max was lowered (measured). `congested`
+        Each frame is sent at most once, while it is fresh, at the rate that the line carries. `congested`
         tells that the line has not taken the earlier bytes yet.
         """
-        limits_m = (scan.min_distance_m, scan.max_distance_m)
         if not self._is_connected(now_ns):
             refusal: Refusal | None = Refusal.NOT_CONNECTED
         elif congested:
             refusal = Refusal.CONGESTED
-        elif self._limits_m not in (None, limits_m):
-            refusal = Refusal.LIMITS_CHANGED
         else:
-            refusal = self._gate.refusal(captured_ns, now_ns)
+            refusal = self._sender.refusal(scan, captured_ns, now_ns)
         if refusal is not None:
             self._refused[refusal.value] += 1
             return False
         time_usec = self._tracker.autopilot_us(captured_ns, now_ns)
         expires_ns = captured_ns + round(self._settings.max_frame_age_s * 1e9)
-        self._outbox.put(encode_obstacle_distance(scan, time_usec, self._choice.profile), expires_ns)
-        self._limits_m = limits_m
-        self._gate.passed(captured_ns, now_ns)
+        messages = self._sender.messages(scan, captured_ns, now_ns, time_usec, self._choice.profile)
+        self._outbox.put_obstacles(messages, expires_ns)
         return True
 
     def set_state(self, state: ServiceState) -> None:
@@ -367,15 +333,18 @@ class LinkSession:
             clock_synced=clock.is_synced(now_ns),
             clock_offset_s=clock.offset_ns / 1e9 if clock.offset_ns is not None else None,
             clock_width_s=clock.width_ns / 1e9 if clock.width_ns is not None else None,
-            sent_obstacles=self._sent_obstacles,
+            sent_obstacles=self._outbox.sent_obstacles,
             profile=self._choice.profile.name if vehicle else None,
             obstacle_rate_hz=self._obstacle_meter.per_second(now_ns),
+            obstacle_rate_limit_hz=self._sender.rate_hz,
+            byte_budget_per_s=self._bytes_per_s,
+            dropped_messages=self._outbox.dropped,
             refused_obstacles=dict(self._refused),
             bytes_in_per_s=self._in_meter.per_second(now_ns),
             bytes_out_per_s=self._out_meter.per_second(now_ns),
             bad_bytes=self._bad_bytes,
-            signed=self._signing is not None,
-            refused_packets=dict(self._refused_packets),
+            signed=self._trust.signing is not None,
+            refused_packets=dict(self._trust.refused),
             other_system_ids=tuple(sorted(self._learner.others)),
             problem=self._notices.standing,
         )

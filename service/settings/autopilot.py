@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import Field, field_validator
 
+from service.autopilot.byte_budget import LEAST_BYTES_PER_S
 from service.autopilot.endpoint import parse_endpoint
 from service.errors import LinkError
 from service.settings.section import Section
@@ -48,6 +49,16 @@ class AutopilotSettings(Section):
         title="OBSTACLE_DISTANCE rate, hertz",
         description="At most this many messages a second, each made from a new frame. ArduPilot needs one "
         "every 0.5 s, and stops later the slower they come.",
+    )
+    bytes_per_s: int = Field(
+        default=0,
+        ge=0,
+        le=2_000_000,
+        title="Byte budget, bytes a second",
+        description="What may leave for the autopilot. HEARTBEAT and OBSTACLE_DISTANCE go first, other "
+        "messages wait and are dropped, and OBSTACLE_DISTANCE is sent at a lower rate rather than late. At "
+        "least 2100, which carries 10 a second; 0 takes 80 % of a serial port's rate, and sets no limit on a "
+        "network.",
     )
     max_frame_age_s: float = Field(
         default=0.3,
@@ -112,6 +123,13 @@ class AutopilotSettings(Section):
         title="Oldest height, seconds",
         description="A rangefinder reading further than this from the frame's capture is not used.",
     )
+
+    @field_validator("bytes_per_s")
+    @classmethod
+    def _carries_enough(cls, value: int) -> int:
+        if 0 < value < LEAST_BYTES_PER_S:
+            raise ValueError(f"{value} is neither 0 nor at least {LEAST_BYTES_PER_S}")
+        return value
 
     @field_validator("endpoint")
     @classmethod
