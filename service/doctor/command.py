@@ -84,10 +84,16 @@ def doctor(
     plan = plan_of(settings.autopilot, scan.min_distance_m, trusted_m, latency_s)
 
     stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda _number, _frame: stop.set())
+    before = {
+        number: signal.signal(number, lambda _number, _frame: stop.set())
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
     examination = Examination(settings.autopilot, plan, scan.max_distance_m, probe)
-    seen = listen(examination, settings.autopilot.endpoint, seconds, MonotonicClock(), stop)
+    try:
+        seen = listen(examination, settings.autopilot.endpoint, seconds, MonotonicClock(), stop)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
     findings = examine(seen, plan)
 
     if as_json:

@@ -14,7 +14,7 @@ _TURN_NS = 100_000_000
 """Five names each 0.1 s: 2.7 kB/s with the answers, which 57600 baud carries."""
 
 _RETRY_NS = 600_000_000
-_MOST_TRIES = 5
+_MOST_TRIES = 8
 
 _WHOLE_FORMATS = {
     mavlink.MAV_PARAM_TYPE_UINT8: "<Bxxx",
@@ -54,7 +54,7 @@ class ParameterReader:
         return tuple(name for name in self._names if name not in self._values)
 
     def is_done(self, now_ns: int) -> bool:
-        """Everything has answered, or was asked five times and given 0.6 s after the last."""
+        """Everything has answered, or was asked eight times and given 0.6 s after the last."""
         return all(
             self._tries[name] >= _MOST_TRIES and now_ns - self._asked_ns[name] >= _RETRY_NS
             for name in self.unanswered
