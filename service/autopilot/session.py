@@ -293,6 +293,10 @@ class LinkSession:
         """Queue a STATUSTEXT; repeated texts are held back."""
         self._texts.say(severity, text, now_ns)
 
+    def ask(self, message: mavlink.MAVLink_message, expires_ns: int) -> None:
+        """Queue a message of the caller's own; it leaves with the link's signature and within its budget."""
+        self._outbox.put(message, expires_ns)
+
     # -- what is known
 
     def telemetry_at(self, captured_ns: int, now_ns: int) -> Telemetry:
