@@ -44,7 +44,7 @@ def obstacle_words(scan: ObstacleScan, profile: AutopilotProfile = ARDUPILOT) ->
         ScanError: arrays that are not numbers or not 72 long, or limits outside 1 cm <= min,
             min + 2 cm <= max <= 600 m.
     """
-    min_cm, max_cm = _limits_cm(scan)
+    min_cm, max_cm = limits_cm(scan)
     distance = _seventy_two("distance_m", scan.distance_m)
     state = _seventy_two("state", scan.state)
 
@@ -81,7 +81,7 @@ def encode_obstacle_distance(
 
     if not 0 <= time_usec < 2**64:
         raise ScanError(f"time_usec is {time_usec}: 0 to 2^64 - 1 microseconds is needed")
-    min_cm, max_cm = _limits_cm(scan)
+    min_cm, max_cm = limits_cm(scan)
     return MAVLink_obstacle_distance_message(
         time_usec=int(time_usec),
         sensor_type=MAV_DISTANCE_SENSOR_UNKNOWN,
@@ -95,7 +95,12 @@ def encode_obstacle_distance(
     )
 
 
-def _limits_cm(scan: ObstacleScan) -> tuple[int, int]:
+def limits_cm(scan: ObstacleScan) -> tuple[int, int]:
+    """min_distance and max_distance of the message.
+
+    Raises:
+        ScanError: see `obstacle_words`.
+    """
     limits = []
     for name in ("min_distance_m", "max_distance_m"):
         metres = float(getattr(scan, name))

@@ -14,6 +14,7 @@ class Refusal(Enum):
     TOO_SOON = "too_soon"
     CONGESTED = "congested"
     LIMITS_CHANGED = "limits_changed"
+    NO_ATTITUDE = "no_attitude"
 
 
 class ObstacleGate:

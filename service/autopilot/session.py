@@ -207,10 +207,10 @@ class LinkSession:
     def _tell_profile(self) -> None:
         profile, version = self._choice.profile, self._choice.version
         release = "" if version is None else " for version " + ".".join(map(str, version))
-        self._notices.news(
-            f"obstacle profile {profile.name}{release}: {profile.element_count} elements of "
-            f"{profile.increment_deg:g} degrees"
-        )
+        layout = f"{profile.element_count} elements of {profile.increment_deg:g} degrees"
+        if self._sender.sends_points(profile):
+            layout = "OBSTACLE_DISTANCE_3D"
+        self._notices.news(f"obstacle profile {profile.name}{release}: {layout}")
 
     def _on_protocol(self, mavlink1: bool) -> None:
         self._mavlink1 = mavlink1
@@ -265,24 +265,25 @@ class LinkSession:
     def send_obstacles(
         self, scan: ObstacleScan, captured_ns: int, now_ns: int, congested: bool = False
     ) -> bool:
-        """Queue an OBSTACLE_DISTANCE for the frame captured at `captured_ns`, if it may be sent.
+        """Queue the obstacles of the frame captured at `captured_ns`, if it may be sent.
 
         Each frame is sent at most once, while it is fresh, at the rate that the line carries. `congested`
         tells that the line has not taken the earlier bytes yet.
         """
+        profile = self._choice.profile
+        attitude = self._tracker.telemetry_at(captured_ns).attitude
         if not self._is_connected(now_ns):
             refusal: Refusal | None = Refusal.NOT_CONNECTED
         elif congested:
             refusal = Refusal.CONGESTED
         else:
-            refusal = self._sender.refusal(scan, captured_ns, now_ns)
+            refusal = self._sender.refusal(scan, captured_ns, now_ns, profile, attitude)
         if refusal is not None:
             self._refused[refusal.value] += 1
             return False
         time_usec = self._tracker.autopilot_us(captured_ns, now_ns)
-        expires_ns = captured_ns + round(self._settings.max_frame_age_s * 1e9)
-        messages = self._sender.messages(scan, captured_ns, now_ns, time_usec, self._choice.profile)
-        self._outbox.put_obstacles(messages, expires_ns)
+        messages = self._sender.messages(scan, captured_ns, now_ns, time_usec, profile, attitude)
+        self._outbox.put_obstacles(messages, captured_ns + round(self._settings.max_frame_age_s * 1e9))
         return True
 
     def set_state(self, state: ServiceState) -> None:

@@ -50,6 +50,13 @@ class AutopilotSettings(Section):
         description="At most this many messages a second, each made from a new frame. ArduPilot needs one "
         "every 0.5 s, and stops later the slower they come.",
     )
+    obstacle_points: bool = Field(
+        default=False,
+        title="OBSTACLE_DISTANCE_3D",
+        description="Sends ArduPilot's BendyRuler points, tilted as the vehicle is, instead of "
+        "OBSTACLE_DISTANCE, which wipes them. Needs a network, or a line of 26000 bytes/s; other autopilots "
+        "get OBSTACLE_DISTANCE in any case. Open and unknown are the same in it.",
+    )
     bytes_per_s: int = Field(
         default=0,
         ge=0,
