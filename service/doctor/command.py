@@ -62,6 +62,7 @@ def doctor(
     It listens to the autopilot, asks for message rates as `run` does, and reads parameters. Exit codes: 0 no
     failure (there may be warnings), 1 a failure, 2 a wrong configuration or command line.
     """
+    from service.autopilot.signing_key import load_signing_key
     from service.clock import MonotonicClock
     from service.doctor.checks import examine
     from service.doctor.examination import Examination, plan_of
@@ -81,14 +82,16 @@ def doctor(
         raise ConfigError(f"--fix {fix}: exists already; give a new file")
     scan = settings.scan
     trusted_m = scan.max_distance_m if range_m is None else min(range_m, scan.max_distance_m)
-    plan = plan_of(settings.autopilot, scan.min_distance_m, trusted_m, latency_s)
+    key_file = settings.autopilot.signing_key_file
+    key = load_signing_key(Path(key_file).expanduser()) if key_file else None
+    plan = plan_of(settings.autopilot, scan.min_distance_m, trusted_m, latency_s, signs=key is not None)
 
     stop = threading.Event()
     before = {
         number: signal.signal(number, lambda _number, _frame: stop.set())
         for number in (signal.SIGINT, signal.SIGTERM)
     }
-    examination = Examination(settings.autopilot, plan, scan.max_distance_m, probe)
+    examination = Examination(settings.autopilot, plan, scan.max_distance_m, key, probe)
     try:
         seen = listen(examination, settings.autopilot.endpoint, seconds, MonotonicClock(), stop)
     finally:

@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from service.autopilot.outbox import Outbox
+from service.autopilot.byte_budget import bytes_per_s_of
 from service.autopilot.rate_meter import RateMeter
 from service.autopilot.session import LinkSession
+from service.autopilot.signing import Signing, Verdict, is_signed
+from service.autopilot.signing_key import SigningKey
 from service.autopilot.streams import wanted_streams
 from service.doctor.observation import PX4, Observation, Plan
 from service.doctor.parameter_names import PARAMETERS
@@ -20,12 +22,11 @@ from service.settings.autopilot import AutopilotSettings
 from uavdepth.obstacle_message import encode_obstacle_distance
 from uavdepth.obstacle_scan import SECTOR_COUNT, ObstacleScan, SectorState, sector_bearings_deg
 
-_SIGNED_FLAG = 0x01
-_STX_V2 = 0xFD
 _ASK_AGAIN_NS = 500_000_000
 _PROBE_LIFE_NS = 50_000_000
 """A message of the trial that could not leave at once never leaves: "disarmed" would be too old."""
 
+_QUESTION_LIFE_NS = 1_000_000_000
 _MOST_SOURCES = 8
 _MOST_TEXTS = 10
 _DOWNWARD = mavlink.MAV_SENSOR_ROTATION_PITCH_270
@@ -42,16 +43,22 @@ class Examination:
         settings: the `[autopilot]` section.
         plan: what the service means to do.
         sent_range_m: max_distance of the trial's messages; the service's own, as PX4 remembers the largest.
+        key: what the link signs with, or None.
         probe: whether the trial is allowed.
     """
 
     def __init__(
-        self, settings: AutopilotSettings, plan: Plan, sent_range_m: float, probe: bool = True
+        self,
+        settings: AutopilotSettings,
+        plan: Plan,
+        sent_range_m: float,
+        key: SigningKey | None = None,
+        probe: bool = True,
     ) -> None:
         self._settings = settings
         self._empty = unknown_everywhere(plan.nearest_m, sent_range_m)
-        self._session = LinkSession(settings)
-        self._outbox = Outbox()
+        self._session = LinkSession(settings, key)
+        self._ear = None if key is None else Signing(key)
         self._codecs: dict[Hashable, Any] = {}
         self._reader: ParameterReader | None = None
         self._probe = ObstacleProbe(probe)
@@ -101,7 +108,7 @@ class Examination:
             return
         codec = self._codecs.setdefault(source, _new_codec())
         for message in codec.parse_buffer(data) or []:
-            if message.get_type() != "BAD_DATA":
+            if message.get_type() != "BAD_DATA" and self._is_believed(message):
                 self._on_message(message, arrival_ns, source)
 
     def tick(self, now_ns: int) -> None:
@@ -114,24 +121,23 @@ class Examination:
             return
         if self._heard_ns is None:
             self._heard_ns = now_ns
-        self._outbox.set_system_id(status.system_id)
         if self._reader is None:
             self._reader = ParameterReader(
                 PARAMETERS.get(status.autopilot or "", ()), status.autopilot == PX4
             )
         for request in self._reader.requests(status.system_id, now_ns):
-            self._outbox.put(request)
+            self._session.ask(request, now_ns + _QUESTION_LIFE_NS)
         if now_ns >= self._ask_ns:
             self._ask_ns = now_ns + _ASK_AGAIN_NS
             self._ask(status.system_id, now_ns)
         if self._probe.may_send(
             status.autopilot, status.armed, status.heartbeat_age_s, self._other_sender, now_ns
         ):
-            self._outbox.put(encode_obstacle_distance(self._empty), now_ns + _PROBE_LIFE_NS)
+            self._session.ask(encode_obstacle_distance(self._empty), now_ns + _PROBE_LIFE_NS)
 
     def take_output(self, now_ns: int) -> list[bytes]:
         """Frames to write now, in order."""
-        return [*self._session.take_output(now_ns), *(frame for _, frame in self._outbox.take(now_ns))]
+        return self._session.take_output(now_ns)
 
     def observation(self, now_ns: int) -> Observation:
         """What is known now."""
@@ -145,6 +151,7 @@ class Examination:
             autopilot=status.autopilot,
             version=self._version,
             system_id=status.system_id,
+            profile=status.profile,
             other_system_ids=status.other_system_ids,
             mode=status.mode,
             armed=status.armed,
@@ -164,6 +171,7 @@ class Examination:
             proximity_before=self._probe.before,
             proximity_during=self._probe.during,
             refusals=tuple(self._refusals),
+            refused_packets=dict(status.refused_packets),
         )
 
     def _ask(self, system_id: int, now_ns: int) -> None:
@@ -171,7 +179,7 @@ class Examination:
         if self._probe.before is None or self._probe.wants_status(now_ns):
             wanted.append(mavlink.MAVLINK_MSG_ID_SYS_STATUS)
         for message_id in wanted:
-            self._outbox.put(
+            self._session.ask(
                 mavlink.MAVLink_command_long_message(
                     system_id,
                     mavlink.MAV_COMP_ID_AUTOPILOT1,
@@ -179,8 +187,12 @@ class Examination:
                     0,
                     float(message_id),
                     *[0.0] * 6,
-                )
+                ),
+                now_ns + _QUESTION_LIFE_NS,
             )
+
+    def _is_believed(self, message: Any) -> bool:
+        return self._ear is None or self._ear.verdict(message.get_msgbuf()) is Verdict.GOOD
 
     def _on_message(self, message: Any, arrival_ns: int, source: Hashable) -> None:
         status = self._session.status(arrival_ns)
@@ -191,8 +203,7 @@ class Examination:
         if sender != (status.system_id, mavlink.MAV_COMP_ID_AUTOPILOT1):
             self._other_sender = self._other_sender or name == "OBSTACLE_DISTANCE"
             return
-        frame = message.get_msgbuf()
-        self._signed = frame[0] == _STX_V2 and bool(frame[2] & _SIGNED_FLAG)
+        self._signed = is_signed(message.get_msgbuf())
         if name == "PARAM_VALUE" and self._reader is not None:
             self._reader.on_value(message)
         elif name == "DISTANCE_SENSOR":
@@ -226,7 +237,11 @@ class Examination:
 
 
 def plan_of(
-    settings: AutopilotSettings, nearest_m: float, range_m: float, latency_s: float | None = None
+    settings: AutopilotSettings,
+    nearest_m: float,
+    range_m: float,
+    latency_s: float | None = None,
+    signs: bool = False,
 ) -> Plan:
     """What the service means to do by its settings."""
     return Plan(
@@ -236,6 +251,8 @@ def plan_of(
         system_id=settings.system_id,
         wanted_hz={stream.message: stream.rate_hz for stream in wanted_streams(settings)},
         latency_s=latency_s,
+        signs=signs,
+        bytes_per_s=bytes_per_s_of(settings.bytes_per_s, settings.endpoint),
     )
 
 

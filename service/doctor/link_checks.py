@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+from service.autopilot.byte_budget import LEAST_RATE_HZ, OBSTACLE_BYTES, obstacle_rate_hz
 from service.autopilot.endpoint import SerialEndpoint, TcpEndpoint, UdpListenEndpoint, parse_endpoint
+from service.autopilot.signing import Verdict
 from service.doctor.finding import Finding, Level
 from service.doctor.observation import Observation, Plan
 
-MESSAGE_BYTES = 179
-SIGNATURE_BYTES = 13
 BITS_PER_BYTE = 10
 """8N1: a start and a stop bit."""
 
 SAFE_BAUD = 115_200
-_MUCH_OF_THE_LINE = 0.7
 
 
 def check_heartbeat(seen: Observation, plan: Plan) -> list[Finding]:
@@ -25,6 +24,8 @@ def check_heartbeat(seen: Observation, plan: Plan) -> list[Finding]:
     if seen.autopilot is not None:
         version = "" if seen.version is None else " " + ".".join(map(str, seen.version))
         text = f"{seen.autopilot}{version}, system {seen.system_id}, is heard on {seen.endpoint}"
+        if seen.profile is not None:
+            text += f"; obstacles go out in the layout {seen.profile}"
         return [Finding(Level.OK, "heartbeat", text)]
     if seen.line_error is not None:
         text = f"{seen.endpoint} cannot be used: {seen.line_error}"
@@ -34,6 +35,8 @@ def check_heartbeat(seen: Observation, plan: Plan) -> list[Finding]:
         text = f"no HEARTBEAT of system {plan.system_id} came, but those of {others} did"
         fix = "set [autopilot] system_id to the vehicle's, or to 0 to take the first one"
         return [Finding(Level.FAILURE, "heartbeat", text, fix)]
+    if seen.refused_packets:
+        return [_refused(seen)]
     if seen.bytes_received == 0:
         text = f"nothing at all came on {seen.endpoint} in {seen.seconds:.0f} s"
         return [Finding(Level.FAILURE, "heartbeat", text, _how_to_be_heard(seen.endpoint))]
@@ -74,29 +77,28 @@ def check_signing(seen: Observation, plan: Plan) -> list[Finding]:
             "signing",
             "the autopilot signs its messages: an unsigned OBSTACLE_DISTANCE is ignored without a word "
             "(but on ArduPilot's first port, SERIAL0)",
-            "give the service the vehicle's signing key, or switch signing off for this vehicle",
+            "give the vehicle's key in [autopilot] signing_key_file, or switch signing off on the vehicle",
         )
     ]
 
 
 def check_budget(seen: Observation, plan: Plan) -> list[Finding]:
-    """Whether a serial line carries the messages in time (R22)."""
-    place = parse_endpoint(seen.endpoint)
-    if not isinstance(place, SerialEndpoint):
+    """Whether the line carries the messages at the wanted rate and in time (R22)."""
+    if not plan.bytes_per_s:
         return []
-    size = MESSAGE_BYTES + (SIGNATURE_BYTES if seen.signed else 0)
-    line_bytes = place.baud / BITS_PER_BYTE
-    share, each_ms = size * plan.rate_hz / line_bytes, 1000.0 * size / line_bytes
-    load = (
-        f"{plan.rate_hz:g} messages/s take {100 * share:.0f} % of {place.baud} baud, "
-        f"{each_ms:.0f} ms each on the wire"
-    )
-    fix = f"set SERIALn_BAUD and the endpoint to {SAFE_BAUD} or more, 921600 if the cable allows"
-    if share > _MUCH_OF_THE_LINE:
-        return [Finding(Level.FAILURE, "serial rate", f"{load}: they would pile up", fix)]
-    if place.baud < SAFE_BAUD:
-        return [Finding(Level.WARNING, "serial rate", f"{load}, which adds to the latency", fix)]
-    return [Finding(Level.OK, "serial rate", load)]
+    place = parse_endpoint(seen.endpoint)
+    baud = place.baud if isinstance(place, SerialEndpoint) else None
+    carried_hz = obstacle_rate_hz(plan.rate_hz, plan.bytes_per_s)
+    text = f"{plan.bytes_per_s} bytes/s carry {carried_hz:.1f} obstacle messages/s of {plan.rate_hz:g} wanted"
+    fix = "raise [autopilot] bytes_per_s"
+    if baud is not None:
+        text += f"; each takes {1000.0 * OBSTACLE_BYTES * BITS_PER_BYTE / baud:.0f} ms at {baud} baud"
+        fix = f"set SERIALn_BAUD and the endpoint to {SAFE_BAUD} or more, 921600 if the cable allows"
+    if carried_hz < LEAST_RATE_HZ:
+        return [Finding(Level.FAILURE, "byte budget", f"{text}: too few to stop in time", fix)]
+    if carried_hz < plan.rate_hz or (baud is not None and baud < SAFE_BAUD):
+        return [Finding(Level.WARNING, "byte budget", f"{text}, which adds to the latency", fix)]
+    return [Finding(Level.OK, "byte budget", text)]
 
 
 def check_clock(seen: Observation, plan: Plan) -> list[Finding]:
@@ -122,6 +124,26 @@ def check_others(seen: Observation, plan: Plan) -> list[Finding]:
     others = ", ".join(str(number) for number in seen.other_system_ids)
     text = f"other autopilots are heard too: system {others}; obstacles go to system {seen.system_id} only"
     return [Finding(Level.WARNING, "other vehicles", text, "set [autopilot] system_id to this vehicle's")]
+
+
+def _refused(seen: Observation) -> Finding:
+    """Packets came, and none was believed: their signatures do not fit the key."""
+    reasons = {
+        Verdict.UNSIGNED.value: (
+            "the autopilot's packets are not signed, and only signed ones are believed",
+            "set the key up on the autopilot (SETUP_SIGNING), or leave [autopilot] signing_key_file empty",
+        ),
+        Verdict.WRONG.value: (
+            "the autopilot's packets are signed with another key than ours",
+            "give [autopilot] signing_key_file the key that the autopilot has",
+        ),
+    }
+    most = max(seen.refused_packets, key=lambda reason: seen.refused_packets[reason])
+    text, fix = reasons.get(
+        most,
+        ("the autopilot's packets carry old time stamps", "look for a replay, or set its signing up anew"),
+    )
+    return Finding(Level.FAILURE, "heartbeat", text, fix)
 
 
 def _how_to_open(endpoint: str) -> str:

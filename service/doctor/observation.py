@@ -36,6 +36,7 @@ class Plan:
         wanted_hz: message name to the rate that it asks the autopilot for.
         latency_s: measured time from capture to wire, or None if it was not given.
         signs: it signs its messages.
+        bytes_per_s: what the line may carry; 0 for no limit.
     """
 
     range_m: float = 20.0
@@ -45,6 +46,7 @@ class Plan:
     wanted_hz: Mapping[str, float] = field(default_factory=dict)
     latency_s: float | None = None
     signs: bool = False
+    bytes_per_s: int = 0
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,7 @@ class Observation:
         autopilot: "ardupilot", "px4", ...; None if no autopilot's HEARTBEAT came.
         version: (major, minor, patch) by AUTOPILOT_VERSION, None if not told or 0.0.0.
         system_id: the autopilot's, or None.
+        profile: layout of OBSTACLE_DISTANCE that the service chose, or None.
         other_system_ids: autopilots that were heard and not listened to.
         mode, armed: by the newest HEARTBEAT, or None.
         mavlink1: the autopilot speaks MAVLink 1.
@@ -75,6 +78,7 @@ class Observation:
         probe: what became of the trial.
         proximity_before, proximity_during: proximity bit of SYS_STATUS without and with the trial's messages.
         refusals: "PreArm: ..." texts of the autopilot.
+        refused_packets: packets that were not believed, by what was wrong with their signature.
     """
 
     endpoint: str
@@ -85,6 +89,7 @@ class Observation:
     autopilot: str | None = None
     version: tuple[int, int, int] | None = None
     system_id: int | None = None
+    profile: str | None = None
     other_system_ids: tuple[int, ...] = ()
     mode: str | None = None
     armed: bool | None = None
@@ -104,3 +109,4 @@ class Observation:
     proximity_before: bool | None = None
     proximity_during: bool | None = None
     refusals: tuple[str, ...] = ()
+    refused_packets: Mapping[str, int] = field(default_factory=dict)

@@ -8,6 +8,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from service.autopilot.signing import is_signed
+from service.autopilot.signing_key import SigningKey
 from service.doctor.checks import examine
 from service.doctor.examination import Examination, plan_of
 from service.doctor.finding import Finding
@@ -26,6 +28,7 @@ class Bench:
     Args:
         mavlink1: the autopilot speaks MAVLink 1.
         key: the autopilot signs with it.
+        own_key: the doctor signs with it.
         loses: says of each message, in either direction, whether it is lost.
         probe: the trial is allowed.
         parameters: of the autopilot.
@@ -38,6 +41,7 @@ class Bench:
         key: bytes | None = None,
         loses: Callable[[Any], bool] = lambda message: False,
         probe: bool = True,
+        own_key: bytes | None = None,
         settings: AutopilotSettings = SETTINGS,
         **parameters: float,
     ) -> None:
@@ -45,9 +49,12 @@ class Bench:
         self.autopilot = SimulatedAutopilot(
             make_controller(flavor, system_id=system_id, parameters=parameters), 60.0
         )
-        self.plan = plan_of(settings, 0.2, 20.0, latency_s=0.1)
-        self.examination = Examination(settings, self.plan, 20.0, probe)
+        self.plan = plan_of(settings, 0.2, 20.0, latency_s=0.1, signs=own_key is not None)
+        self.examination = Examination(
+            settings, self.plan, 20.0, None if own_key is None else SigningKey(own_key), probe
+        )
         self.sent: Counter[str] = Counter()
+        self.unsigned = 0
         self.now_ns = 0
         self._mavlink1, self._loses = mavlink1, loses
         self._channel = self.autopilot.open_channel()
@@ -71,6 +78,7 @@ class Bench:
             for frame in self.examination.take_output(self.now_ns):
                 (message,) = mavlink.MAVLink(None).parse_buffer(frame)
                 self.sent[message.get_type()] += 1
+                self.unsigned += not is_signed(frame)
                 if not self._loses(message):
                     self.autopilot.receive(self._channel, message)
         return self.examination.observation(self.now_ns)

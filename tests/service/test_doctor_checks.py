@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+from service.autopilot.byte_budget import bytes_per_s_of
 from service.doctor.checks import examine
 from service.doctor.finding import Finding, Level, has_failure
 from service.doctor.observation import Observation, Plan, Probe
@@ -237,21 +238,27 @@ class TestLink:
     @pytest.mark.parametrize(
         ("baud", "rate_hz", "level", "words"),
         [
-            (9600, 15.0, Level.FAILURE, "280 %"),
-            (38400, 15.0, Level.WARNING, "70 %"),
-            (57600, 15.0, Level.WARNING, "31 ms each"),
-            (57600, 30.0, Level.FAILURE, "93 %"),
-            (115200, 15.0, Level.OK, "16 ms each"),
-            (921600, 30.0, Level.OK, "2 ms each"),
+            (9600, 15.0, Level.FAILURE, "carry 3.2 obstacle messages/s"),
+            (38400, 15.0, Level.WARNING, "50 ms"),
+            (57600, 15.0, Level.WARNING, "33 ms"),
+            (57600, 30.0, Level.WARNING, "carry 23.2 obstacle messages/s of 30"),
+            (115200, 15.0, Level.OK, "17 ms"),
+            (921600, 30.0, Level.OK, "2 ms"),
         ],
     )
-    def test_r22_the_serial_rate_is_held_against_the_bytes_to_send(
+    def test_r22_the_line_is_held_against_the_bytes_to_send(
         self, baud: int, rate_hz: float, level: Level, words: str
     ) -> None:
-        seen = replace(COPTER, endpoint=f"serial:/dev/ttyAMA0:{baud}")
-        finding = about("serial rate", seen, replace(PLAN, rate_hz=rate_hz))
+        endpoint = f"serial:/dev/ttyAMA0:{baud}"
+        plan = replace(PLAN, rate_hz=rate_hz, bytes_per_s=bytes_per_s_of(0, endpoint))
+        finding = about("byte budget", replace(COPTER, endpoint=endpoint), plan)
         assert finding.level is level
         assert words in finding.text
+
+    def test_r22_a_budget_for_a_network_counts_too(self) -> None:
+        seen = replace(COPTER, endpoint="udp:0.0.0.0:14550")
+        assert about("byte budget", seen, replace(PLAN, bytes_per_s=1000)).level is Level.FAILURE
+        assert "byte budget" not in [finding.topic for finding in examine(seen, PLAN)]
 
     def test_r10_a_clock_that_jumps_is_told(self) -> None:
         assert about("clock", replace(COPTER, clock_steps=2)).level is Level.WARNING

@@ -78,6 +78,25 @@ class TestBroken:
         assert bench.run(3.0).signed
         assert bench.findings()["signing"].level is Level.FAILURE
 
+    def test_a_signing_autopilot_with_the_same_key_gets_signed_packets_only(self) -> None:
+        bench = Bench(key=b"k" * 32, own_key=b"k" * 32)
+        seen = bench.run(5.0)
+        assert bench.findings()["signing"].level is Level.OK
+        assert bench.unsigned == 0
+        assert set(seen.parameters) == set(PARAMETERS["ardupilot"])
+        assert seen.proximity_during
+
+    @pytest.mark.parametrize(("theirs", "words"), [(None, "are not signed"), (b"x" * 32, "another key")])
+    def test_a_key_that_does_not_fit_is_told_and_nothing_is_believed(
+        self, theirs: bytes | None, words: str
+    ) -> None:
+        bench = Bench(key=theirs, own_key=b"k" * 32)
+        seen = bench.run(4.0)
+        assert (seen.autopilot, dict(seen.parameters)) == (None, {})
+        finding = bench.findings()["heartbeat"]
+        assert finding.level is Level.FAILURE
+        assert words in finding.text
+
     def test_r10_a_clock_step(self) -> None:
         bench = Bench()
         bench.run(3.0)
