@@ -11,11 +11,16 @@ from uavdepth.vehicle_motion import VehicleMotion
 
 MOST_POINTS = 300
 
-_GROWTH_PER_S = 0.04
+_GROWTH_PER_S = 0.15
 """Relative sigma that a followed point gains in a second without a measurement."""
 
-_LOST_GROWTH_PER_S = 0.15
+_LOST_GROWTH_PER_S = 0.4
 """The same for one that is not followed any more: what is at its pixel now may be another thing."""
+
+
+_PROVEN = 4
+"""Measurements after which a point that is lost is carried on. Most of those that are lost sooner were no
+points at all but places where one edge passes behind another."""
 
 
 class CarriedPoints:
@@ -39,6 +44,7 @@ class CarriedPoints:
         self._sigma = np.empty(0)
         self._offset_sigma = np.empty(0)
         self._measured_ns = np.empty(0, dtype=np.int64)
+        self._times = np.empty(0, dtype=np.int64)
 
     def move(self, now_ns: int, motion: VehicleMotion, mount: CameraMount) -> None:
         """Move all points into the camera's axes at `now_ns`; where the motion is not known they are lost."""
@@ -69,18 +75,22 @@ class CarriedPoints:
             now_ns: time of the picture.
         """
         _, ours, theirs = np.intersect1d(self._ids, ids, assume_unique=True, return_indices=True)
+        times = np.ones(len(ids), dtype=np.int64)
+        times[theirs] += self._times[ours]
+        self._times[ours] += 1
         carried = self._grown(now_ns, np.ones(len(self._ids), dtype=bool))[ours]
         worse = relative_sigma[theirs] > carried
-        keep = np.ones(len(ids), dtype=bool)
-        keep[theirs[worse]] = False
-        replaced = np.ones(len(self._ids), dtype=bool)
-        replaced[ours[~worse]] = False
-        self._keep(replaced)
-        self._ids = np.concatenate([self._ids, ids[keep]])
-        self._points = np.concatenate([self._points, points[keep]])
-        self._sigma = np.concatenate([self._sigma, relative_sigma[keep]])
-        self._offset_sigma = np.concatenate([self._offset_sigma, np.zeros(np.count_nonzero(keep))])
-        self._measured_ns = np.concatenate([self._measured_ns, np.full(np.count_nonzero(keep), now_ns)])
+        new = np.ones(len(ids), dtype=bool)
+        new[theirs[worse]] = False
+        kept = np.ones(len(self._ids), dtype=bool)
+        kept[ours[~worse]] = False
+        self._keep(kept)
+        self._ids = np.concatenate([self._ids, ids[new]])
+        self._points = np.concatenate([self._points, points[new]])
+        self._sigma = np.concatenate([self._sigma, relative_sigma[new]])
+        self._offset_sigma = np.concatenate([self._offset_sigma, np.zeros(np.count_nonzero(new))])
+        self._measured_ns = np.concatenate([self._measured_ns, np.full(np.count_nonzero(new), now_ns)])
+        self._times = np.concatenate([self._times, times[new]])
 
     def drop(self, ids: NDArray[np.int64]) -> None:
         """Forget the points of these tracks."""
@@ -109,7 +119,7 @@ class CarriedPoints:
         size = np.array([self._camera.width, self._camera.height])
         with np.errstate(invalid="ignore"):
             inside = np.all((pixels >= -0.5) & (pixels < size - 0.5), axis=1)
-        inside &= self._points[:, 2] > 0.3
+        inside &= (self._points[:, 2] > 0.3) & (followed | (self._times >= _PROVEN))
         self._keep(inside)
         pixels, sigma = pixels[inside], sigma[inside]
         order = np.argsort(sigma, kind="stable")[:MOST_POINTS]
@@ -124,5 +134,5 @@ class CarriedPoints:
         return np.asarray(np.sqrt(self._sigma**2 + growth**2 + by_offset**2))
 
     def _keep(self, kept: NDArray[np.bool_]) -> None:
-        for name in ("_ids", "_points", "_sigma", "_offset_sigma", "_measured_ns"):
+        for name in ("_ids", "_points", "_sigma", "_offset_sigma", "_measured_ns", "_times"):
             setattr(self, name, getattr(self, name)[kept])

@@ -16,6 +16,9 @@ MOST_TRACKS = 300
 MOST_FRAMES = 32
 """Positions of so many pictures are kept: 2 s at 15 pictures a second."""
 
+_SEARCH_WIDTH = 320
+"""New corners are sought in a picture of about this width; the lengths of the search are its pixels."""
+
 _CELL_PX = 10
 """At most one corner in each cell of so many pixels squared, so that they spread over the picture."""
 
@@ -26,7 +29,7 @@ _NEIGHBOUR_PX = 6
 _LEAST_EIGENVALUE = 2e-4
 """Of a picture of 0 to 1; noise of 2 grey values of 255 stays below it."""
 
-_WINDOW_PX = 13
+_WINDOW_PX = 11
 _PYRAMID_LEVELS = 3
 _CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 15, 0.02)
 _RETURN_PX = 0.4
@@ -100,23 +103,27 @@ class FeatureTracks:
         self.positions = np.concatenate([kept, newest[None]], axis=0)
 
     def _begin(self, grey: NDArray[np.uint8]) -> None:
-        strength = cv2.cornerMinEigenVal(grey, 3, ksize=3)
-        peak = cv2.dilate(strength, np.ones((3, 3), np.uint8))
-        free = (strength == peak) & (strength > _LEAST_EIGENVALUE)
+        # Where a corner lies to a fraction of a pixel does not matter, only that it is the same later on.
+        shrink = max(1, round(grey.shape[1] / _SEARCH_WIDTH))
+        size = grey.shape[1] // shrink, grey.shape[0] // shrink
+        small = cv2.resize(grey, size, interpolation=cv2.INTER_AREA) if shrink > 1 else grey
+        strength = cv2.cornerMinEigenVal(small, 3, ksize=3)
+        free = (strength == cv2.dilate(strength, np.ones((3, 3), np.uint8))) & (strength > _LEAST_EIGENVALUE)
         free[:_BORDER_PX], free[-_BORDER_PX:] = False, False
         free[:, :_BORDER_PX], free[:, -_BORDER_PX:] = False, False
-        taken = np.zeros(grey.shape, np.uint8)
-        column, row = np.rint(self.positions[-1]).astype(np.intp).T
+        taken = np.zeros(small.shape, np.uint8)
+        live = np.rint((self.positions[-1] + 0.5) / shrink - 0.5).astype(np.intp)
+        column, row = np.minimum(live, np.array(size) - 1).T
         taken[row, column] = 1
         side = 2 * _NEIGHBOUR_PX + 1
         free &= cv2.dilate(taken, np.ones((side, side), np.uint8)) == 0
         row, column = np.nonzero(free)
         order = np.argsort(-strength[row, column], kind="stable")
         row, column = row[order], column[order]
-        cell = (row // _CELL_PX) * (grey.shape[1] // _CELL_PX + 1) + column // _CELL_PX
-        _, first = np.unique(cell, return_index=True)
-        first = np.sort(first)[: MOST_TRACKS - len(self.ids)]
+        cell = (row // _CELL_PX) * (size[0] // _CELL_PX + 1) + column // _CELL_PX
+        first = np.sort(np.unique(cell, return_index=True)[1])[: MOST_TRACKS - len(self.ids)]
         new = np.stack([column[first], row[first]], axis=1).astype(np.float32)
+        new = (new + np.float32(0.5)) * np.float32(shrink) - np.float32(0.5)
         past = np.full((len(self.positions), len(new), 2), np.nan, dtype=np.float32)
         past[-1] = new
         self.positions = np.concatenate([self.positions, past], axis=1)

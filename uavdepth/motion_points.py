@@ -18,8 +18,9 @@ from uavdepth.hints import PointHints
 from uavdepth.triangulation import triangulate
 from uavdepth.vehicle_motion import CameraMotion, VehicleMotion
 
-_TRACKING_WIDTH = 320
-"""Pictures are made smaller to about this width: corners are found to a fraction of a pixel all the same."""
+_TRACKING_WIDTH = 640
+"""Wider pictures are made smaller: the time that more pixels take is not worth what they tell. Half of it
+doubles the errors of depth."""
 
 _LONGEST_GAP_NS = 500_000_000
 """After a longer gap between two pictures the tracks begin anew."""
@@ -27,7 +28,7 @@ _LONGEST_GAP_NS = 500_000_000
 _BASELINE_SIGMAS = 3.0
 """In hover the baseline does not stand out of its own noise, and there is no depth."""
 
-_MOST_VIEWS = 6
+_MOST_VIEWS = 5
 
 
 @dataclass(frozen=True)
@@ -35,12 +36,13 @@ class MotionPointSettings:
     """What a point must be to be believed.
 
     Args:
-        pixel_sigma: standard deviation of a tracked corner, pixels of a picture 320 wide.
+        pixel_sigma: standard deviation of a tracked corner, pixels (of a picture at most 640 wide).
         drift_sigma: what is added to it for each 10 pictures that a corner was followed.
         least_views: pictures besides the newest that must have seen a point.
         longest_window_s: oldest picture that is used.
         least_parallax_rad: smallest angle between two rays to a point.
         largest_sigma: largest relative standard deviation of depth.
+        largest_carried_sigma: the same for one that was measured earlier.
         largest_residual: largest re-projection error (root mean square), in standard deviations.
         nearest_m, farthest_m: depths that are believed.
         model_sigma: relative error of depth that noise does not explain: calibration, mount, time stamps.
@@ -53,10 +55,11 @@ class MotionPointSettings:
     longest_window_s: float = 1.5
     least_parallax_rad: float = math.radians(0.6)
     largest_sigma: float = 0.2
-    largest_residual: float = 2.5
+    largest_carried_sigma: float = 0.35
+    largest_residual: float = 1.8
     nearest_m: float = 0.5
     farthest_m: float = 80.0
-    model_sigma: float = 0.01
+    model_sigma: float = 0.02
     carry_s: float = 2.0
 
 
@@ -148,7 +151,7 @@ class MotionPoints:
         views = self._views(captured_ns, motion)
         if views and len(ids):
             self._measure(captured_ns, motion, views)
-        return self._carried.hints(ids, pixels, captured_ns, self.settings.largest_sigma)
+        return self._carried.hints(ids, pixels, captured_ns, self.settings.largest_carried_sigma)
 
     def _views(self, captured_ns: int, motion: VehicleMotion) -> list[tuple[int, CameraMotion]]:
         """Rows of earlier pictures to measure with, each twice as old as the next, and the motion to them."""

@@ -22,12 +22,13 @@ from uavdepth.vehicle_motion import CameraMotion, MotionNoise
 
 Array = NDArray[np.float64]
 
-_ITERATIONS = 5
+_ITERATIONS = 6
 _PLAIN_ITERATIONS = 2
 """Before them no residual is called an outlier: the attitudes are not corrected yet."""
 
-_KIND_PX = 2.0
-"""Residuals beyond it, in standard deviations, count less and less (Cauchy)."""
+_KIND = 2.0
+"""Tracks whose residual is beyond it, in standard deviations, count less and less (Geman and McClure, 1985):
+it is whole tracks that are wrong, since what moves is wrong in all views."""
 
 _PRIOR_INVERSE_DEPTH = 0.05
 _PRIOR_SIGMA = 0.5
@@ -111,7 +112,7 @@ class _Solver:
         residual, pose, by_ray = self._linearised()
         depth = self._along(by_ray)
         if kind:
-            weight = _weight(residual)
+            weight = self._weight(residual)
             residual, pose, depth = residual * weight, pose * weight[..., None], depth * weight
         coupling, information, reduced = self._normal(pose, depth)
         flat = pose.reshape(self.views, -1, 6)
@@ -129,9 +130,8 @@ class _Solver:
     def result(self, here_sigma: float) -> Triangulation:
         """Depth, and its standard deviation from the inverse of the normal equations."""
         residual, pose, by_ray = self._linearised()
-        views = self.there.sum(axis=0)
-        rms = np.sqrt(np.sum(residual**2, axis=(0, 2)) / np.maximum(2 * views - 1, 1))
-        weight = _weight(residual)
+        rms = self._misfit(residual)
+        weight = self._weight(residual)
         depth = self._along(by_ray) * weight
         coupling, information, reduced = self._normal(pose * weight[..., None], depth)
         gain = coupling / information[:, None]
@@ -149,8 +149,20 @@ class _Solver:
             np.sqrt(variance) / self.inverse,
             rms,
             np.where(self.there, parallax, 0.0).max(axis=0, initial=0.0),
-            views,
+            self.there.sum(axis=0),
         )
+
+    def _misfit(self, residual: Array) -> Array:
+        """(N,) root mean square of a track's residuals over its degrees of freedom."""
+        freedom = np.maximum(2 * self.there.sum(axis=0) - 1, 1)
+        return np.asarray(np.sqrt(np.sum(residual**2, axis=(0, 2)) / freedom))
+
+    def _weight(self, residual: Array) -> Array:
+        """(N, 1) square root of the weight of each track."""
+        misfit = self._misfit(residual)
+        # While the attitudes are not corrected yet all tracks are off: the bar falls as they come to fit.
+        bar = _KIND * max(1.0, float(np.median(misfit)))
+        return np.asarray(1.0 / (1.0 + (misfit / bar) ** 2))[:, None]
 
     def _start(self) -> Array:
         """Inverse depth by linear least squares with the motions as given."""
@@ -201,11 +213,6 @@ class _Solver:
 
 def _clipped(inverse: Array) -> Array:
     return np.minimum(np.maximum(inverse, _FARTHEST), _NEAREST)
-
-
-def _weight(residual: Array) -> Array:
-    """(M, N, 1) square root of Cauchy's weight."""
-    return np.asarray(1.0 / np.sqrt(1.0 + np.sum(residual**2, axis=-1, keepdims=True) / _KIND_PX**2))
 
 
 def _prior(motions: Sequence[CameraMotion], noise: MotionNoise) -> Array:
