@@ -52,8 +52,8 @@ class ObstacleSender:
         if self.rate_hz < LEAST_RATE_HZ:
             return (
                 f"the line may carry {self._bytes_per_s} bytes/s, that is {self.rate_hz:.1f} "
-                f"OBSTACLE_DISTANCE a second; the vehicle stops in time with {LEAST_RATE_HZ:g}: raise the baud "
-                "rate, 57600 at least"
+                f"OBSTACLE_DISTANCE a second; the vehicle stops in time with {LEAST_RATE_HZ:g}: raise the "
+                "baud rate, 57600 at least"
             )
         if self._lacks_room_for_points:
             return (
