@@ -31,6 +31,7 @@ _MOST_SOURCES = 8
 _MOST_TEXTS = 10
 _DOWNWARD = mavlink.MAV_SENSOR_ROTATION_PITCH_270
 _FACES = range(8)
+_OBSTACLES = ("OBSTACLE_DISTANCE", "OBSTACLE_DISTANCE_3D")
 
 
 class Examination:
@@ -201,7 +202,7 @@ class Examination:
         name = message.get_type()
         sender = (message.get_srcSystem(), message.get_srcComponent())
         if sender != (status.system_id, mavlink.MAV_COMP_ID_AUTOPILOT1):
-            self._other_sender = self._other_sender or name == "OBSTACLE_DISTANCE"
+            self._other_sender = self._other_sender or name in _OBSTACLES
             return
         self._signed = is_signed(message.get_msgbuf())
         if name == "PARAM_VALUE" and self._reader is not None:
@@ -253,6 +254,7 @@ def plan_of(
         latency_s=latency_s,
         signs=signs,
         bytes_per_s=bytes_per_s_of(settings.bytes_per_s, settings.endpoint),
+        sends_3d=settings.obstacle_points,
     )
 
 

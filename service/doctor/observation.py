@@ -37,6 +37,7 @@ class Plan:
         latency_s: measured time from capture to wire, or None if it was not given.
         signs: it signs its messages.
         bytes_per_s: what the line may carry; 0 for no limit.
+        sends_3d: an ArduPilot gets OBSTACLE_DISTANCE_3D instead.
     """
 
     range_m: float = 20.0
@@ -47,6 +48,7 @@ class Plan:
     latency_s: float | None = None
     signs: bool = False
     bytes_per_s: int = 0
+    sends_3d: bool = False
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,9 @@
 In the air a message without obstacles would wipe those that the autopilot knows, and ArduPilot takes
 "unknown" for a free way. So before every single message the newest HEARTBEAT must be fresh and
 say "disarmed", and the first "armed" ends the trial for good.
+HEARTBEAT comes once a second, so messages may go on for a second after arming on the ground; they take
+nothing away, since there is no trial where somebody else sends obstacles. For 2 s they let an ArduPilot pass
+its arming check "PRX1: No Data".
 """
 
 from __future__ import annotations

@@ -137,7 +137,13 @@ def test_r14_ardupilots_parameters(name: str, value: float, level: Level, recomm
 def test_bendy_ruler_leaves_guided_position_alone_without_its_option() -> None:
     finding = about("OA_TYPE", with_parameters(COPTER, OA_TYPE=1, GUID_OPTIONS=1))
     assert (finding.level, finding.parameter, finding.recommended) == (Level.WARNING, "GUID_OPTIONS", 65)
-    assert about("OA_TYPE", with_parameters(COPTER, OA_TYPE=1, GUID_OPTIONS=64)).level is Level.OK
+
+
+def test_r21_bendy_ruler_wants_the_3d_message() -> None:
+    seen = with_parameters(COPTER, OA_TYPE=1, GUID_OPTIONS=64)
+    assert about("OA_TYPE", seen).level is Level.WARNING
+    assert "5 m too low" in about("OA_TYPE", seen).text
+    assert about("OA_TYPE", seen, replace(PLAN, sends_3d=True)).level is Level.OK
 
 
 PX4_RULES: list[tuple[str, float, Level, float | None]] = [
