@@ -37,6 +37,12 @@ class ProfileChoice:
         self.version: Version | None = None
         """The autopilot's release, or None before it was told."""
 
+    def __str__(self) -> str:
+        release = "" if self.version is None else " for version " + ".".join(map(str, self.version))
+        profile = self.profile
+        layout = f"{profile.element_count} elements of {profile.increment_deg:g} degrees"
+        return f"profile {profile.name}{release} ({layout})"
+
     def on_vehicle(self, autopilot: str) -> None:
         """Another autopilot is listened to: "ardupilot", "px4", ..."""
         self._autopilot, self.version = autopilot, None

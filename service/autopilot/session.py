@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections import Counter, OrderedDict
+from collections import Counter
 from collections.abc import Hashable
 from dataclasses import replace
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from service.autopilot.byte_budget import bytes_per_s_of
-from service.autopilot.framing import FrameReader, is_mavlink1
+from service.autopilot.framing import is_mavlink1
 from service.autopilot.link_status import LinkStatus
 from service.autopilot.motion_history import MotionLimits
 from service.autopilot.notices import Notice, Notices, Problem
@@ -23,6 +23,7 @@ from service.autopilot.rate_meter import RateMeter
 from service.autopilot.service_state import ServiceState
 from service.autopilot.signing import Signing
 from service.autopilot.signing_key import SigningKey
+from service.autopilot.sources import Sources
 from service.autopilot.status_text import StatusTexts
 from service.autopilot.streams import StreamRequests, wanted_streams
 from service.autopilot.telemetry_tracker import TelemetryTracker
@@ -31,9 +32,6 @@ from service.autopilot.vehicle import Hearing, VehicleLearner
 from service.settings.autopilot import AutopilotSettings
 from service.telemetry import Telemetry
 from uavdepth.obstacle_scan import ObstacleScan
-
-_MAX_SOURCES = 8
-"""Senders on a UDP port whose bytes are kept apart."""
 
 _SHORT_LIVED_NS = 1_000_000_000
 """A HEARTBEAT, TIMESYNC or request that could not leave for a second is made anew."""
@@ -62,7 +60,7 @@ class LinkSession:
         self._settings = settings
         self._timeout_ns = round(settings.heartbeat_timeout_s * 1e9)
         self._learner = VehicleLearner(settings.system_id, self._timeout_ns)
-        self._readers: OrderedDict[Hashable, FrameReader] = OrderedDict()
+        self._sources = Sources()
         self._tracker = TelemetryTracker(MotionLimits.of(settings))
         self._streams = StreamRequests(wanted_streams(settings))
         self._timesync = TimeSync(round(1e9 / settings.timesync_rate_hz))
@@ -81,7 +79,6 @@ class LinkSession:
         self._opened_ns = 0
         self._heard_ns: int | None = None
         self._mavlink1 = False
-        self._bad_bytes = 0
         self._line_losses = 0
         self._refused: Counter[str] = Counter()
         self._obstacle_meter, self._in_meter, self._out_meter = RateMeter(), RateMeter(), RateMeter()
@@ -96,11 +93,10 @@ class LinkSession:
     def line_opened(self, now_ns: int) -> None:
         """The socket or port is open: say hello at the next `tick`."""
         self._line_open, self._opened_ns = True, now_ns
-        self._readers.clear()
+        self._sources.clear()
         self._outbox.clear()
         self._presence.restart()
-        self._timesync.restart()
-        self._streams.restart()
+        self._ask_again()
         if self._notices.over(Problem.LINE):
             self._notices.news(f"autopilot line {self._settings.endpoint} is open")
         if self._sender.complaint is not None:
@@ -131,14 +127,8 @@ class LinkSession:
             source: who sent it, on a line with many ends.
         """
         self._in_meter.add(arrival_ns, len(data))
-        reader = self._readers.pop(source, None) or FrameReader()
-        self._readers[source] = reader
-        if len(self._readers) > _MAX_SOURCES:
-            self._readers.popitem(last=False)
-        bad_bytes = reader.bad_bytes
-        for message in reader.read(data):
+        for message in self._sources.read(data, source):
             self._on_message(message, arrival_ns, source)
-        self._bad_bytes += reader.bad_bytes - bad_bytes
 
     def _on_message(self, message: mavlink.MAVLink_message, arrival_ns: int, source: Hashable) -> None:
         name = message.get_type()
@@ -205,12 +195,8 @@ class LinkSession:
         self._choice.restart()
 
     def _tell_profile(self) -> None:
-        profile, version = self._choice.profile, self._choice.version
-        release = "" if version is None else " for version " + ".".join(map(str, version))
-        layout = f"{profile.element_count} elements of {profile.increment_deg:g} degrees"
-        if self._sender.sends_points(profile):
-            layout = "OBSTACLE_DISTANCE_3D"
-        self._notices.news(f"obstacle profile {profile.name}{release}: {layout}")
+        points = " as OBSTACLE_DISTANCE_3D" if self._sender.sends_points(self._choice.profile) else ""
+        self._notices.news(f"obstacles go out in the {self._choice}{points}")
 
     def _on_protocol(self, mavlink1: bool) -> None:
         self._mavlink1 = mavlink1
@@ -347,7 +333,7 @@ class LinkSession:
             refused_obstacles=dict(self._refused),
             bytes_in_per_s=self._in_meter.per_second(now_ns),
             bytes_out_per_s=self._out_meter.per_second(now_ns),
-            bad_bytes=self._bad_bytes,
+            bad_bytes=self._sources.bad_bytes,
             signed=self._trust.signing is not None,
             refused_packets=dict(self._trust.refused),
             other_system_ids=tuple(sorted(self._learner.others)),
