@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-MOST_TRACKS = 300
+MOST_TRACKS = 240
 MOST_FRAMES = 32
 """Positions of so many pictures are kept: 2 s at 15 pictures a second."""
 
@@ -33,7 +33,7 @@ _WINDOW_PX = 11
 _PYRAMID_LEVELS = 3
 _CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 15, 0.02)
 _RETURN_PX = 0.4
-_SPARE_TRACKS = 40
+_SPARE_TRACKS = 30
 """New corners are sought when so many are missing."""
 
 

@@ -22,7 +22,8 @@ from uavdepth.vehicle_motion import CameraMotion, MotionNoise
 
 Array = NDArray[np.float64]
 
-_ITERATIONS = 6
+_ITERATIONS = 8
+_CONVERGED = 0.001
 _PLAIN_ITERATIONS = 2
 """Before them no residual is called an outlier: the attitudes are not corrected yet."""
 
@@ -86,7 +87,9 @@ def triangulate(
     """
     solver = _Solver(rays, seen, motions, sigma, noise)
     for number in range(_ITERATIONS):
-        solver.step(kind=number >= _PLAIN_ITERATIONS)
+        kind = number >= _PLAIN_ITERATIONS
+        if solver.step(kind) < _CONVERGED and kind:
+            break
     return solver.result(here_sigma)
 
 
@@ -107,8 +110,12 @@ class _Solver:
         self.prior = _prior(motions, noise)
         self.inverse = self._start()
 
-    def step(self, kind: bool) -> None:
-        """One iteration; a kind one weighs residuals down that are too large for noise."""
+    def step(self, kind: bool) -> float:
+        """One iteration; a kind one weighs tracks down that are too far off for noise.
+
+        Returns:
+            The median change of the inverse depths, as a share of their own.
+        """
         residual, pose, by_ray = self._linearised()
         depth = self._along(by_ray)
         if kind:
@@ -121,11 +128,15 @@ class _Solver:
         along = np.sum(depth * residual, axis=(0, 2))
         along += (_PRIOR_INVERSE_DEPTH - self.inverse) / _PRIOR_SIGMA**2
         change = np.linalg.solve(reduced, gradient - coupling.T @ (along / information))
-        self.inverse = _clipped(self.inverse + (along - coupling @ change) / information)
+        before, self.inverse = (
+            self.inverse,
+            _clipped(self.inverse + (along - coupling @ change) / information),
+        )
         self.corrections += change.reshape(-1, 6)
         for view, turn in enumerate(change.reshape(-1, 6)[:, :3]):
             self.rotations[view] = cv2.Rodrigues(turn)[0] @ self.rotations[view]
         self.offsets += change.reshape(-1, 6)[:, 3:]
+        return float(np.median(np.abs(self.inverse - before) / before))
 
     def result(self, here_sigma: float) -> Triangulation:
         """Depth, and its standard deviation from the inverse of the normal equations."""
