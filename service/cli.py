@@ -41,6 +41,9 @@ class Command:
 COMMANDS = {
     "run": Command("service.run_command", "run", "Fly: camera to depth to OBSTACLE_DISTANCE and Zenoh."),
     "watch": Command("service.watch.command", "watch", "Show scan and status of vehicles live."),
+    "doctor": Command(
+        "service.doctor.command", "doctor", "Say why obstacles would not show or not stop the vehicle."
+    ),
     "demo": Command(
         "service.demo.command", "demo", "Fly a simulated vehicle at a wall that only the network sees."
     ),

@@ -42,7 +42,9 @@ def doctor(
     ] = None,
     range_m: Annotated[
         float | None,
-        typer.Option("--range", min=1.0, max=100.0, help="Range to trust, metres, if below [scan]'s."),
+        typer.Option(
+            "--range", min=1.0, max=100.0, help="Range to trust, metres, if below the configured one."
+        ),
     ] = None,
     probe: Annotated[
         bool,
