@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from service.autopilot.byte_budget import bytes_per_s_of
 from service.autopilot.framing import is_mavlink1
 from service.autopilot.link_status import LinkStatus
+from service.autopilot.link_watch import LinkWatch
 from service.autopilot.motion_history import MotionLimits
 from service.autopilot.notices import Notice, Notices, Problem
 from service.autopilot.obstacle_gate import Refusal
@@ -38,11 +39,6 @@ _SHORT_LIVED_NS = 1_000_000_000
 
 _TEXT_LIVES_NS = 10_000_000_000
 """A text for the pilot has this long to find room on the line."""
-
-_MAVLINK1_TEXT = (
-    "the autopilot speaks MAVLink 1, in which OBSTACLE_DISTANCE does not exist: set SERIALn_PROTOCOL to 2 "
-    "(ArduPilot) or MAV_PROTO_VER to 2 (PX4)"
-)
 
 
 class LinkSession:
@@ -72,13 +68,13 @@ class LinkSession:
         self._outbox = Outbox(self._bytes_per_s)
         self._outbox.set_system_id(settings.system_id or 1)
         self._notices = Notices()
+        self._watch = LinkWatch(self._notices, settings.endpoint)
         self._trust = PacketTrust(self._notices)
         if key is not None:
             self.sign_with(key)
         self._line_open = False
         self._opened_ns = 0
         self._heard_ns: int | None = None
-        self._mavlink1 = False
         self._line_losses = 0
         self._refused: Counter[str] = Counter()
         self._obstacle_meter, self._in_meter, self._out_meter = RateMeter(), RateMeter(), RateMeter()
@@ -142,7 +138,7 @@ class LinkSession:
             self._on_vehicle_back(arrival_ns)
         self._heard_ns = arrival_ns
         self._trust.on_vehicle(message)
-        self._on_protocol(is_mavlink1(message))
+        self._watch.protocol(is_mavlink1(message))
         reboots, steps = self._tracker.reboots, self._tracker.clock.steps
         if name == "ATTITUDE":
             self._tracker.on_attitude(message, arrival_ns)
@@ -169,11 +165,7 @@ class LinkSession:
         hearing = self._learner.on_heartbeat(heartbeat, source, arrival_ns)
         vehicle = self._learner.vehicle
         if hearing is Hearing.FOREIGN and vehicle is not None:
-            self._notices.problem(
-                Problem.FOREIGN,
-                f"another autopilot is heard (system {heartbeat.get_srcSystem()}): listening to system "
-                f"{vehicle.system_id} only",
-            )
+            self._watch.stranger(heartbeat.get_srcSystem(), vehicle.system_id)
         if hearing is Hearing.LEARNT and vehicle is not None:
             if before is not None:
                 self._tracker.forget()
@@ -197,13 +189,6 @@ class LinkSession:
     def _tell_profile(self) -> None:
         points = " as OBSTACLE_DISTANCE_3D" if self._sender.sends_points(self._choice.profile) else ""
         self._notices.news(f"obstacles go out in the {self._choice}{points}")
-
-    def _on_protocol(self, mavlink1: bool) -> None:
-        self._mavlink1 = mavlink1
-        if mavlink1:
-            self._notices.problem(Problem.MAVLINK1, _MAVLINK1_TEXT)
-        else:
-            self._notices.over(Problem.MAVLINK1)
 
     def _on_timesync(self, message: mavlink.MAVLink_timesync_message, arrival_ns: int) -> None:
         answer = self._timesync.answer(message, arrival_ns)
@@ -237,7 +222,7 @@ class LinkSession:
             self._outbox.put(question, now_ns + _SHORT_LIVED_NS)
         for text in self._texts.due(now_ns):
             self._outbox.put(text, now_ns + _TEXT_LIVES_NS)
-        self._watch_streams()
+        self._watch.streams(self._streams.refused())
 
     def take_output(self, now_ns: int) -> list[bytes]:
         """Frames to write now, in order."""
@@ -316,7 +301,7 @@ class LinkSession:
             mode=vehicle.mode if vehicle else None,
             armed=vehicle.armed if vehicle else None,
             heartbeat_age_s=(now_ns - vehicle.heard_ns) / 1e9 if vehicle else None,
-            mavlink1_seen=self._mavlink1,
+            mavlink1_seen=self._watch.mavlink1,
             rates_hz=self._streams.rates_hz(now_ns),
             reboots=self._tracker.reboots,
             clock_steps=clock.steps,
@@ -344,21 +329,7 @@ class LinkSession:
         return self._line_open and self._heard_ns is not None and now_ns - self._heard_ns <= self._timeout_ns
 
     def _watch_connection(self, now_ns: int) -> None:
-        endpoint = self._settings.endpoint
         if self._is_connected(now_ns):
-            self._notices.over(Problem.SILENT)
+            self._watch.connected()
         elif now_ns - max(self._opened_ns, self._heard_ns or 0) > self._timeout_ns:
-            if self._learner.vehicle is None:
-                self._notices.problem(Problem.SILENT, f"no autopilot's HEARTBEAT has come on {endpoint}")
-            else:
-                self._notices.problem(Problem.SILENT, f"the autopilot has gone silent on {endpoint}")
-
-    def _watch_streams(self) -> None:
-        refused = self._streams.refused()
-        if not refused:
-            self._notices.over(Problem.STREAMS)
-            return
-        missing = ", ".join(f"{stream.message} at {stream.rate_hz:g} Hz" for stream in refused)
-        self._notices.problem(
-            Problem.STREAMS, f"the autopilot does not send what it was asked for: {missing}"
-        )
+            self._watch.silent(was_heard=self._learner.vehicle is not None)

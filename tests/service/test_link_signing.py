@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import itertools
+import socket
+import time
+from contextlib import closing, suppress
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from link_support import SECOND_NS as S
-from link_support import TICK_NS, Voice, clear_scan
+from link_support import TICK_NS, Voice, clear_scan, message_id
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from service.autopilot.link import AutopilotLink
@@ -26,6 +29,8 @@ KEY, OTHER_KEY = SigningKey(bytes(range(32))), SigningKey(bytes(range(1, 33)))
 YEARS = 11 * 365 * 24 * 3600 * 100_000
 """A time stamp of these years: 10 microseconds since 2015."""
 SECOND = 100_000
+PATIENCE_S = 20.0
+"""How long a test waits for what must come; nothing is asserted of how soon it does."""
 
 
 class SignedVoice(Voice):
@@ -225,6 +230,28 @@ def test_an_autopilot_that_signs_while_no_key_is_set_is_a_problem_that_is_told()
     assert all(not frame[2] & 1 for frame in link.speak(1.0))
     link.hear(Voice().heartbeat())
     assert link.status.problem is None
+
+
+def test_over_a_socket_a_signing_autopilot_and_the_link_believe_each_other(tmp_path: Path) -> None:
+    key_file = written(tmp_path, b"passphrase: correct horse")
+    link = AutopilotLink(
+        AutopilotSettings(endpoint="udp:127.0.0.1:0", signing_key_file=str(key_file)), MonotonicClock()
+    )
+    key = SigningKey(hashlib.sha256(b"correct horse").digest())
+    voice, autopilot, frames = SignedVoice(key), Listener(key), list[bytes]()
+    end_s = time.monotonic() + PATIENCE_S
+    with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as peer, closing(link):
+        link.start()
+        peer.connect(("127.0.0.1", link.listen_port))
+        peer.settimeout(0.05)
+        while not {0, 76, 111} <= {message_id(frame) for frame in frames}:
+            assert time.monotonic() < end_s, f"waited in vain, heard {len(frames)} packets"
+            peer.send(voice.heartbeat())
+            with suppress(TimeoutError):
+                frames.append(peer.recv(1000))
+        assert link.status().connected
+        assert link.status().signed
+    assert all(autopilot.takes(frame) for frame in frames)
 
 
 class TestKeyFile:
