@@ -136,3 +136,21 @@ def test_every_public_name_is_there():
     assert all(getattr(uavdepth, name) is not None for name in uavdepth.__all__)
     with pytest.raises(AttributeError, match="no attribute 'DepthModle'"):
         _ = uavdepth.DepthModle
+
+
+@pytest.mark.parametrize("distortion", [(), (-0.25, 0.06, 0.001, -0.0005)])
+def test_points_are_seen_where_their_rays_start(distortion: tuple[float, ...]) -> None:
+    camera = CameraModel(640, 320, 350, 345, 322.5, 158.0, distortion)
+    pixels = np.array([[0.0, 0.0], [320.3, 160.7], [639.0, 319.0], [100.25, 250.5]])
+    rays = np.concatenate([camera.straightened(pixels), np.ones((4, 1))], axis=1)
+    np.testing.assert_allclose(camera.projected(rays * 7.0), pixels, atol=1e-3)
+    np.testing.assert_allclose(rays[2], camera.normalized_rays[319, 639], atol=1e-5)
+    assert camera.straightened(np.empty((0, 2))).shape == (0, 2)
+
+
+def test_what_is_behind_the_camera_has_no_pixel() -> None:
+    camera = CameraModel.from_fov(640, 320, 90)
+    seen = camera.projected(np.array([[0.0, 0.0, -5.0], [0.0, 0.0, 5.0]]))
+    assert np.isnan(seen[0]).all()
+    np.testing.assert_allclose(seen[1], (319.5, 159.5))
+    assert np.isnan(camera.projected(np.array([[1.0, 0.0, 0.0]]))).all()
