@@ -23,7 +23,9 @@ from uavdepth.vehicle_motion import CameraMotion, MotionNoise
 Array = NDArray[np.float64]
 
 _ITERATIONS = 8
-_CONVERGED = 0.001
+_CONVERGED = 0.002
+"""Median change of inverse depth, relative, at which the iterations end."""
+
 _PLAIN_ITERATIONS = 2
 """Before them no residual is called an outlier: the attitudes are not corrected yet."""
 
