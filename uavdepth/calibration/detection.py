@@ -18,6 +18,10 @@ A wider one is out of focus, or the board moved and a rolling shutter bent it as
 
 _WIDTH_OF_LIMIT = 1280
 _FEWEST_CORNERS = 8
+_REFINED_SHARE = 0.25
+_REFINED_PX = (2, 11)
+"""Reach of the refinement to each side: a share of the shortest side, so that it sees one corner only."""
+
 _LARGEST_MISFIT = 0.2
 """Of a square's side. A lens bends a board by some hundredths; a wrong layout shifts corners by a square."""
 
@@ -90,14 +94,13 @@ class BoardDetector:
             if ids is None or len(ids) == 0:
                 return None
             return np.asarray(ids, np.intp).ravel(), np.asarray(corners, np.float32).reshape(-1, 2)
-        # Duda and Frese 2018: needs no refinement, and is right to 0.05 pixels where cornerSubPix is to 0.1.
         whole, corners = cv2.findChessboardCornersSB(
             gray, self.board.inner, flags=cv2.CALIB_CB_NORMALIZE_IMAGE
         )
         if not whole:
             return None
         pixels = np.asarray(corners, np.float32).reshape(-1, 2)
-        return np.arange(len(pixels)), pixels
+        return np.arange(len(pixels)), _refined(gray, pixels, self.board)
 
 
 def other_board(board: Board, image: NDArray[np.uint8]) -> str | None:
@@ -130,6 +133,21 @@ def _other_markers(board: Board, gray: NDArray[np.uint8]) -> str | None:
     return (
         "its markers, but in another layout (columns and rows swapped, charuco-legacy?) or too few at a time"
     )
+
+
+def _refined(gray: NDArray[np.uint8], pixels: NDArray[np.float32], board: Board) -> NDArray[np.float32]:
+    """(N, 2) corners of a whole chessboard, where the grey values' gradients meet.
+
+    On rendered pictures of a small tilted board the focal length came out 0.4 % too long without it and
+    within 0.1 % with it, and the error of the corners halved.
+    """
+    columns, rows = board.inner
+    grid = pixels.reshape(rows, columns, 2)
+    spacing_px = min(float(np.linalg.norm(np.diff(grid, axis=axis), axis=2).min()) for axis in (0, 1))
+    reach = int(np.clip(round(_REFINED_SHARE * spacing_px), *_REFINED_PX))
+    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-3)
+    moved = cv2.cornerSubPix(gray, pixels.reshape(-1, 1, 2).copy(), (reach, reach), (-1, -1), criteria)
+    return np.asarray(moved, np.float32).reshape(-1, 2)
 
 
 def _on_a_line(points: NDArray[np.float32]) -> bool:

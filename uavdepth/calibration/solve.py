@@ -20,8 +20,11 @@ FEWEST_VIEWS = 4
 """Three are enough for the equations; the fourth shows whether they agree."""
 
 _OUTLIER_FACTOR = 3.0
-_OUTLIER_FLOOR_PX = 0.3
+_OUTLIER_FLOOR_PX = 0.5
 """A picture whose error is this many times the median's, and this large, is left out."""
+
+_LEAST_FOCAL = 0.05
+"""Of the picture's width: a pinhole camera with less would see 169 degrees."""
 
 _OUTLIER_ROUNDS = 6
 _LEFT_OUT_AT_MOST = 1 / 3
@@ -160,9 +163,13 @@ def _solve_once(
         raise CalibrationError(f"no camera explains the {len(views)} pictures: {error.err}") from error
     count = _COEFFICIENTS[distortion]
     lens = np.asarray(coefficients, np.float64).ravel()[:count]
-    if not (np.isfinite(matrix).all() and np.isfinite(lens).all()):
-        raise CalibrationError(f"no camera explains the {len(views)} pictures: the solution is not finite")
     width, height = size
+    focal_px = float(min(matrix[0, 0], matrix[1, 1]))
+    if not (np.isfinite(matrix).all() and np.isfinite(lens).all() and focal_px > _LEAST_FOCAL * width):
+        raise CalibrationError(
+            f"no camera explains the {len(views)} pictures: the focal length came out as {focal_px:.3g} "
+            "pixels; if all pictures face the board squarely, tilt it by 20 to 45 degrees to all sides"
+        )
     camera = CameraModel(
         width,
         height,
