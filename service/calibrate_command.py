@@ -42,7 +42,7 @@ def calibrate(
             help="chessboard:9x6:25mm (inner corners, side) or charuco:7x5:30mm:22mm[:DICTIONARY] "
             "(squares, side, marker)."
         ),
-    ] = "charuco:9x7:25mm:18mm",
+    ] = "charuco:9x7:22mm:16mm",
     distortion: Annotated[
         Distortion, typer.Option(help="Lens model; rational8 for very wide lenses.")
     ] = Distortion.BROWN5,

@@ -193,3 +193,13 @@ def test_a_command_that_cannot_work_says_why(words: tuple[str, ...], text: str) 
     result = run(*words)
     assert isinstance(result.exception, ConfigError)
     assert text in str(result.exception)
+
+
+def test_the_default_board_fits_on_a_sheet_of_a4(tmp_path: Path) -> None:
+    file = tmp_path / "board.png"
+    assert CliRunner().invoke(app, ["--print-board", str(file)]).exit_code == 0
+    height, width = cv2.imread(str(file)).shape[:2]
+    data = file.read_bytes()
+    per_m = int.from_bytes(data[data.index(b"pHYs") + 4 :][:4], "big")
+    assert width / per_m < 0.285
+    assert height / per_m < 0.2
