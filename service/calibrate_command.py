@@ -39,8 +39,8 @@ def calibrate(
     board: Annotated[
         str,
         typer.Option(
-            help="chessboard:9x6:25mm (inner corners, side) or charuco:7x5:30mm:22mm[:DICTIONARY] "
-            "(squares, side, marker)."
+            help="chessboard:9x6:25mm (inner corners, side) or charuco:7x5:30mm:22mm:5X5_100 "
+            "(squares, side, marker, dictionary)."
         ),
     ] = "charuco:9x7:22mm:16mm",
     distortion: Annotated[
@@ -61,7 +61,7 @@ def calibrate(
     ] = 60.0,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="Write the [camera] section there, not to the terminal."),
+        typer.Option("--output", "-o", help="Write the camera section there, not to the terminal."),
     ] = None,
     picture: Annotated[
         Path | None, typer.Option(help="Write the coverage picture there (.png or .jpg).")
@@ -70,7 +70,8 @@ def calibrate(
         Path | None, typer.Option(help="Write the board there as a PNG to print, and end.")
     ] = None,
     force: Annotated[
-        bool, typer.Option(help="Overwrite files, and give the section in spite of serious remarks.")
+        bool,
+        typer.Option("--force", help="Overwrite files, and give the section in spite of serious remarks."),
     ] = False,
     as_json_text: Annotated[
         bool, typer.Option("--json", help="Print everything as JSON in place of words.")
