@@ -44,6 +44,9 @@ COMMANDS = {
     "doctor": Command(
         "service.doctor.command", "doctor", "Say why obstacles would not show or not stop the vehicle."
     ),
+    "calibrate": Command(
+        "service.calibrate_command", "calibrate", "Intrinsics of a camera from pictures of a board."
+    ),
     "demo": Command(
         "service.demo.command", "demo", "Fly a simulated vehicle at a wall that only the network sees."
     ),
