@@ -210,7 +210,8 @@ class _Solver:
 
     def _along(self, by_ray: Array) -> Array:
         """Slope of the residuals by inverse depth, (M, N, 2)."""
-        return (by_ray.reshape(self.views, -1, 3) @ self.offsets[..., None]).reshape(self.views, -1, 2)
+        slope: Array = by_ray.reshape(self.views, -1, 3) @ self.offsets[..., None]
+        return slope.reshape(self.views, -1, 2)
 
     def _normal(self, pose: Array, depth: Array) -> tuple[Array, Array, Array]:
         """Coupling (N, 6M), information of each inverse depth (N,), and the reduced matrix (6M, 6M)."""
