@@ -17,11 +17,11 @@ def run(
         Path | None, typer.Option("--config", "-c", help="TOML file; see `uavdepth config example`.")
     ] = None,
     camera: Annotated[
-        str | None, typer.Option(help="Camera in place of `[camera] source`, e.g. 0 or sim:city:3.")
+        str | None, typer.Option(help="Camera in place of the configured one, e.g. 0 or sim:city:3.")
     ] = None,
     autopilot: Annotated[
         str | None,
-        typer.Option(help="Endpoint in place of `[autopilot] endpoint`, e.g. tcp:127.0.0.1:5760."),
+        typer.Option(help="Endpoint in place of the configured one, e.g. tcp:127.0.0.1:5760."),
     ] = None,
     overrides: Annotated[
         list[str] | None,

@@ -22,7 +22,7 @@ def doctor(
     ] = None,
     autopilot: Annotated[
         str | None,
-        typer.Option(help="Endpoint in place of `[autopilot] endpoint`, e.g. tcp:127.0.0.1:5760."),
+        typer.Option(help="Endpoint in place of the configured one, e.g. tcp:127.0.0.1:5760."),
     ] = None,
     overrides: Annotated[
         list[str] | None,
