@@ -4,29 +4,22 @@ from __future__ import annotations
 
 import signal
 import threading
-from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from service.options import AutopilotOption, ConfigOption, OverridesOption
 
 _POLL_S = 0.1
 
 
 def run(
-    config: Annotated[
-        Path | None, typer.Option("--config", "-c", help="TOML file; see `uavdepth config example`.")
-    ] = None,
+    config: ConfigOption = None,
     camera: Annotated[
         str | None, typer.Option(help="Camera in place of the configured one, e.g. 0 or sim:city:3.")
     ] = None,
-    autopilot: Annotated[
-        str | None,
-        typer.Option(help="Endpoint in place of the configured one, e.g. tcp:127.0.0.1:5760."),
-    ] = None,
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Any other key; may be given many times."),
-    ] = None,
+    autopilot: AutopilotOption = None,
+    overrides: OverridesOption = None,
 ) -> None:
     """Fly: camera to depth to OBSTACLE_DISTANCE and Zenoh, until interrupted."""
     stop = threading.Event()

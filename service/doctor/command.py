@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from service.options import AutopilotOption, ConfigOption, OverridesOption
+
 if TYPE_CHECKING:
     from service.doctor.finding import Finding
     from service.doctor.observation import Observation
@@ -17,17 +19,9 @@ EXIT_FAILURE = 1
 
 
 def doctor(
-    config: Annotated[
-        Path | None, typer.Option("--config", "-c", help="TOML file; see `uavdepth config example`.")
-    ] = None,
-    autopilot: Annotated[
-        str | None,
-        typer.Option(help="Endpoint in place of the configured one, e.g. tcp:127.0.0.1:5760."),
-    ] = None,
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Any other key; may be given many times."),
-    ] = None,
+    config: ConfigOption = None,
+    autopilot: AutopilotOption = None,
+    overrides: OverridesOption = None,
     seconds: Annotated[
         float, typer.Option(min=1.0, max=300.0, help="How long to listen once the autopilot is heard.")
     ] = 8.0,
