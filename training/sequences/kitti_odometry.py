@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from training.errors import TrainingDataError
 from training.sequences.errors import BrokenFrameError
-from training.sequences.frame_sequence import file_problem
 from training.sequences.kitti_calibration import camera_from_projection, matrix, projection, read_matrices
 from training.sequences.numbered_files import numbered_files, without_gaps
-from training.sequences.pictures import read_calibrated_picture, read_picture
+from training.sequences.picture_files import PictureFiles
+from training.sequences.pictures import read_picture
 from training.sequences.pose_file import read_rows
 from training.sequences.truth import usable_truth
 from training.sequences.velodyne import project_points, read_velodyne
-from uavdepth.camera import CameraModel
 
 _CAMERAS = ("image_2", "image_3", "image_0", "image_1")
 """Colour before grey, left before right."""
@@ -26,7 +25,7 @@ _SUFFIXES = (".png", ".jpg")
 
 
 @dataclass(frozen=True)
-class KittiOdometrySequence:
+class KittiOdometrySequence(PictureFiles):
     """The pictures of one camera of one sequence; a `FrameSequence`, with poses where they are published.
 
     Args:
@@ -39,28 +38,10 @@ class KittiOdometrySequence:
         left_from_camera: (4, 4) pose of this camera in the left grey one's axes.
     """
 
-    name: str
-    camera: CameraModel
-    pictures: tuple[Path, ...]
     first_number: int
     image_from_lidar: NDArray[np.float64] | None
     poses: NDArray[np.float64] | None
     left_from_camera: NDArray[np.float64]
-
-    def __len__(self) -> int:
-        return len(self.pictures)
-
-    def file_of(self, index: int) -> Path:
-        """The picture."""
-        return self.pictures[index]
-
-    def problem(self, index: int) -> str | None:
-        """A missing or empty picture."""
-        return file_problem(self.pictures[index])
-
-    def image_bgr(self, index: int) -> NDArray[np.uint8]:
-        """(H, W, 3) picture. Raises BrokenFrameError: missing, unreadable or of another size."""
-        return read_calibrated_picture(self.pictures[index], self.camera)
 
     def truth_m(self, index: int) -> NDArray[np.float32] | None:
         """(H, W) z-depth of the LiDAR's points, NaN between them. Raises BrokenFrameError: unreadable."""

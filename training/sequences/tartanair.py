@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from training.errors import TrainingDataError
 from training.sequences.errors import BrokenFrameError
-from training.sequences.frame_sequence import file_problem
-from training.sequences.pictures import PICTURE_SUFFIXES, read_calibrated_picture, require_first_picture
+from training.sequences.picture_files import PictureFiles
+from training.sequences.pictures import PICTURE_SUFFIXES, require_first_picture
 from training.sequences.pose_file import read_rows
 from training.sequences.quaternion import rotation_from_quaternion
 from training.sequences.truth import usable_truth
@@ -25,7 +25,7 @@ _IMAGES, _DEPTHS, _POSES = "image_left", "depth_left", "pose_left.txt"
 
 
 @dataclass(frozen=True)
-class TartanAirTrajectory:
+class TartanAirTrajectory(PictureFiles):
     """One trajectory; a `FrameSequence` with poses.
 
     Args:
@@ -36,26 +36,8 @@ class TartanAirTrajectory:
         poses: (N, 7) x, y, z (NED, metres) and quaternion x, y, z, w of the camera, or None.
     """
 
-    name: str
-    camera: CameraModel
-    pictures: tuple[Path, ...]
     depths: tuple[Path | None, ...]
     poses: NDArray[np.float64] | None
-
-    def __len__(self) -> int:
-        return len(self.pictures)
-
-    def file_of(self, index: int) -> Path:
-        """The picture."""
-        return self.pictures[index]
-
-    def problem(self, index: int) -> str | None:
-        """A missing or empty picture."""
-        return file_problem(self.pictures[index])
-
-    def image_bgr(self, index: int) -> NDArray[np.uint8]:
-        """(H, W, 3) picture. Raises BrokenFrameError: missing, unreadable or of another size."""
-        return read_calibrated_picture(self.pictures[index], self.camera)
 
     def truth_m(self, index: int) -> NDArray[np.float32] | None:
         """(H, W) z-depth. Raises BrokenFrameError: unreadable or of another size."""
