@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,10 +17,16 @@ from training.evaluation_command import evaluate
 from training.extras import needs_extra
 from training.train_command import train
 
+if TYPE_CHECKING:
+    from training.checkpoint import Checkpoint
+    from training.doubt_calibration import DoubtCalibration
+
 __all__ = ["evaluate", "export", "train"]
 
 DEFAULT_CHECKPOINT = Path("training_run/checkpoint.pt")
 DEFAULT_NAME = "lite0-fan-eca"
+_CALIBRATION_SEEDS = "900-903"
+_CALIBRATION_FRAMES = 12
 
 
 def export(
@@ -33,6 +40,15 @@ def export(
     size: Annotated[
         str | None, typer.Option(help="Input as WIDTHxHEIGHT; that of the run's last phase if not given.")
     ] = None,
+    calibrate: Annotated[
+        Path | None,
+        typer.Option(
+            help="Calibrate sigma on worlds of validation seeds; their frames are kept in this folder."
+        ),
+    ] = None,
+    calibration_seeds: Annotated[
+        str, typer.Option(help="Seeds of those worlds, 900 to 999.")
+    ] = _CALIBRATION_SEEDS,
 ) -> None:
     """Write a trained network as ONNX with its card.
 
@@ -43,11 +59,36 @@ def export(
         from training.export import export_checkpoint
 
     errors = _measured_errors(measured) if measured is not None else {}
-    card = export_checkpoint(Checkpoint.load(checkpoint), output, name, errors, _parsed_size(size))
+    run, wanted = Checkpoint.load(checkpoint), _parsed_size(size)
+    factor = 1.0
+    if calibrate is not None:
+        found = _calibrated(run, wanted, name, calibrate, calibration_seeds)
+        errors["sigma_calibration"], factor = found.as_json(), found.factor
+        typer.echo(f"sigma is multiplied by {factor:.3f}, from {found.frames} frames of {found.data}")
+    card = export_checkpoint(run, output, name, errors, wanted, factor)
     typer.echo(
         f"{output}: {card.name}, {card.input_width}x{card.input_height}, "
         f"{output.stat().st_size / 1e6:.1f} MB, checked against PyTorch"
     )
+
+
+def _calibrated(
+    run: Checkpoint, size: tuple[int, int] | None, name: str, store: Path, seeds: str
+) -> DoubtCalibration:
+    """Sigma's calibration of the network as it will fly."""
+    with needs_extra("export --calibrate", "sim"):
+        from training.doubt_calibration import calibrate_doubt
+        from training.evaluation_frames import EvaluationPlan, parse_seeds
+        from training.export import export_checkpoint
+        from uavdepth.depth_model import DepthModel
+        from uavdepth.scenes import HELD_OUT_SCENES, SCENE_NAMES
+
+    scenes = tuple(scene for scene in SCENE_NAMES if scene not in HELD_OUT_SCENES)
+    plan = EvaluationPlan(scenes, parse_seeds(seeds), _CALIBRATION_FRAMES, store)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "uncalibrated.onnx"
+        export_checkpoint(run, path, name, size=size)
+        return calibrate_doubt(DepthModel.load(str(path), "cpu"), plan)
 
 
 def _parsed_size(text: str | None) -> tuple[int, int] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -54,13 +55,14 @@ _KNOWN_EVERY = 37
 class _TwoOutputs(nn.Module):
     """The network with its outputs as a plain tuple: ONNX knows no dataclasses."""
 
-    def __init__(self, network: DepthNetwork) -> None:
+    def __init__(self, network: DepthNetwork, sigma_factor: float = 1.0) -> None:
         super().__init__()
         self.network = network
+        self._log_factor = math.log(sigma_factor)
 
     def forward(self, image: Tensor, ground: Tensor, points: Tensor) -> tuple[Tensor, Tensor]:
         output = self.network(image, ground, points)
-        return output.log_inverse_depth, output.log_sigma
+        return output.log_inverse_depth, output.log_sigma + self._log_factor
 
 
 def export_checkpoint(
@@ -69,6 +71,7 @@ def export_checkpoint(
     name: str,
     measured: Mapping[str, JsonValue] | None = None,
     size: tuple[int, int] | None = None,
+    sigma_factor: float = 1.0,
 ) -> ModelCard:
     """Write the averaged weights of a run, in half precision, as an ONNX file with its card.
 
@@ -82,18 +85,21 @@ def export_checkpoint(
         name: of the network, for status and records.
         measured: errors on frames it was not trained on, for the card.
         size: width and height of the input, divisible by 32; None takes those of the run's last phase.
+        sigma_factor: what the network's sigma is multiplied by, see `training.doubt_calibration`.
 
     Returns:
         The card that was written.
 
     Raises:
-        ExportError: a size that the network cannot take, a weight that half precision cannot hold, or a
-            written network that does not compute what PyTorch does.
+        ExportError: a size that the network cannot take, a factor that is not above 0, a weight that half
+            precision cannot hold, or a written network that does not compute what PyTorch does.
         CheckpointError: weights that do not fit the network.
     """
+    if not (math.isfinite(sigma_factor) and sigma_factor > 0):
+        raise ExportError(f"the factor of sigma is {sigma_factor}: a finite number above 0 is needed")
     last = checkpoint.settings.phases[-1]
     card = make_card(checkpoint, name, measured or {}, size or (last.width, last.height))
-    network = _TwoOutputs(rounded_network(checkpoint.averaged_network())).eval()
+    network = _TwoOutputs(rounded_network(checkpoint.averaged_network()), sigma_factor).eval()
     model = _to_onnx(network, card)
     store_in_half(model)
     onnx.checker.check_model(model)

@@ -203,3 +203,27 @@ def test_a_missing_checkpoint_writes_nothing(tmp_path: Path) -> None:
     with pytest.raises(CheckpointError, match=r"none\.pt"):
         export(tmp_path / "out.onnx", checkpoint=tmp_path / "none.pt", name="narrow", measured=None)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_sigma_is_multiplied_by_the_calibrations_factor_and_depth_is_not(
+    checkpoint: Checkpoint, exported: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "calibrated.onnx"
+    export_checkpoint(checkpoint, path, "narrow", size=SIZE, sigma_factor=0.5)
+    camera = CameraModel.from_fov(*SIZE, 75.0)
+    picture = np.random.default_rng(1).integers(0, 256, (SIZE[1], SIZE[0], 3), dtype=np.uint8)
+    before, after = (
+        DepthModel.load(file, provider="cpu").infer(picture, camera) for file in (exported, path)
+    )
+    assert before.relative_sigma is not None
+    assert after.relative_sigma is not None
+    assert np.allclose(after.relative_sigma, 0.5 * before.relative_sigma, rtol=1e-3, equal_nan=True)
+    assert np.allclose(after.depth_m, before.depth_m, rtol=1e-4, equal_nan=True)
+
+
+@pytest.mark.parametrize("factor", [0.0, -1.0, math.nan, math.inf])
+def test_a_factor_of_sigma_that_is_none_is_refused(
+    checkpoint: Checkpoint, tmp_path: Path, factor: float
+) -> None:
+    with pytest.raises(ExportError, match="factor of sigma"):
+        export_checkpoint(checkpoint, tmp_path / "net.onnx", "narrow", size=SIZE, sigma_factor=factor)
