@@ -116,12 +116,9 @@ def _moved_obstacles(scan: ObstacleScan, turned_deg: float, way: NDArray[np.floa
     # A way that leads through an obstacle ends at it: it was nearer than it was told to be.
     ahead = np.abs(_wrapped(centres - _bearing_deg(way))) <= SECTOR_WIDTH_DEG / 2
     reach[(ahead & (float(np.hypot(*way)) >= before))[:, 0]] = 0.0
-    low = (
-        np.where(reach < _AT_HAND_M, edges[:, :-1], np.minimum(bearing[:, :-1], bearing[:, 1:])) - turned_deg
-    )
-    high = (
-        np.where(reach < _AT_HAND_M, edges[:, 1:], np.maximum(bearing[:, :-1], bearing[:, 1:])) - turned_deg
-    )
+    at_hand = reach < _AT_HAND_M
+    low = np.where(at_hand, edges[:, :-1], np.minimum(bearing[:, :-1], bearing[:, 1:])) - turned_deg
+    high = np.where(at_hand, edges[:, 1:], np.maximum(bearing[:, :-1], bearing[:, 1:])) - turned_deg
     reach = np.minimum(reach, np.maximum(before, scan.max_distance_m - _BELOW_MAX_M))
     overlap = _OVERLAP_DEG / SECTOR_WIDTH_DEG
     first = np.floor(_element(low) + 0.5 + overlap).astype(np.intp)
