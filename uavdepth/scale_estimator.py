@@ -1,0 +1,271 @@
+"""Metres for a network that has none, or that is not to be trusted with them.
+
+Two sources: points measured by the vehicle's own motion, and the ground at a known height. What a reading
+is: `scale_points` and `ground_scale`; how readings become one scale: `scale_filter`; how inverse depth up to
+scale and shift gets both: `scale_shape`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from uavdepth.body_rays import body_rays
+from uavdepth.camera import CameraModel, CameraMount
+from uavdepth.depth_map import DepthMap
+from uavdepth.errors import ImageSizeError
+from uavdepth.ground_scale import MAX_PLANE_DEPTH_M, MIN_DEPRESSION, MIN_HEIGHT_M, GroundScaler
+from uavdepth.hints import GroundHint, PointHints
+from uavdepth.scale_filter import GROUND, POINTS, ScaleFilter, ScaleReading
+from uavdepth.scale_points import LEAST_POINTS, PointScale, sample, scale_from_points
+from uavdepth.scale_shape import AffineSamples, AffineShape, fit_affine
+from uavdepth.scale_suspicion import Disagreement
+
+NetworkKind = Literal["relative", "affine", "metric"]
+
+METRIC_FACTORS = (0.4, 2.5)
+"""Ground that asks a network which is metric by itself for a larger correction is not the ground below:
+a valley floor or a roof (over a valley factors near 0.25 came out, each with a small sigma)."""
+
+WANDER_PER_SQRT_S = 0.06
+"""A network's scale wanders with what it sees: relative sigma added by the square root of a second."""
+
+_GROUND_DOUBT = 0.07
+"""Relative error of metres from the ground that no single picture shows: 2 % of slope, half a degree of
+attitude, the rangefinder over grass."""
+
+_GROUND_COLUMNS = 32
+_GROUND_SIGMA = 0.1
+_RECENT_S = 0.3
+
+
+@dataclass(frozen=True)
+class ScaleEstimate:
+    """How the network's answer becomes metres.
+
+    1 / depth_m = scale * raw + shift, raw being 1 / depth of a relative or metric network, or the inverse
+    depth of an affine one.
+
+    Args:
+        scale: 1 / metres for each unit of `raw`.
+        shift: 1 / metres where `raw` is 0; 0 unless the network is affine.
+        relative_sigma: one standard deviation of metres over metres, of the scale alone.
+        sources: what it rests on now, of "ground" and "points"; empty while it is held.
+        age_s: time since one of them was last heard, seconds.
+        suspicion: what the sources together say is wrong with the configuration, in words, or None.
+        scatter: relative error of the network's depth from place to place as the points show it; 0 where
+            they never did.
+        covariance: of scale and shift, (variance, covariance, variance); zeros unless the network is affine.
+    """
+
+    scale: float
+    shift: float
+    relative_sigma: float
+    sources: tuple[str, ...]
+    age_s: float
+    suspicion: str | None = None
+    scatter: float = 0.0
+    covariance: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def factor(self) -> float:
+        """Metres for each unit of depth of a network that is not affine."""
+        return 1.0 / self.scale
+
+
+class ScaleEstimator:
+    """The scale of one network's depth, from picture to picture.
+
+    In hover points are carried for a while and the ground goes on; without either the last scale is held
+    with a doubt that grows. Times are passed in.
+
+    Args:
+        camera, mount: the camera and how it sits on the vehicle.
+        kind: "relative": depth up to one factor; "affine": inverse depth up to scale and shift;
+            "metric": depth in metres that are doubted.
+        hold_s: how long a scale is held after the last source spoke, seconds.
+
+    Raises:
+        ValueError: a kind that is none of these, or a time that is not finite or below 0.
+    """
+
+    def __init__(
+        self, camera: CameraModel, mount: CameraMount, kind: NetworkKind = "relative", hold_s: float = 30.0
+    ) -> None:
+        if kind not in ("relative", "affine", "metric"):
+            raise ValueError(f"kind is {kind!r}: 'relative', 'affine' or 'metric' is needed")
+        if not (math.isfinite(hold_s) and hold_s >= 0):
+            raise ValueError(f"hold_s is {hold_s}: a finite time of 0 s or more is needed")
+        self.camera = camera
+        self.mount = mount
+        self.kind = kind
+        self.hold_s = hold_s
+        self._plausible = METRIC_FACTORS if kind == "metric" else None
+        self._scaler = GroundScaler(camera, mount, self._plausible)
+        self._filter = ScaleFilter(WANDER_PER_SQRT_S)
+        self._stride = max(1, round(camera.width / _GROUND_COLUMNS))
+        self._rays = body_rays(camera, mount, self._stride).reshape(3, -1)
+        self._disagreement = Disagreement()
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget everything: the camera or the network was changed, or time went back."""
+        self._filter.clear()
+        self._disagreement.clear()
+        self._shape: AffineShape | None = None
+        self._scatter = 0.0
+        self._at_ns: int | None = None
+
+    def update(
+        self, depth: DepthMap, ground: GroundHint | None, points: PointHints | None, captured_ns: int
+    ) -> ScaleEstimate | None:
+        """The scale to use for one picture.
+
+        Args:
+            depth: the network's answer, in its own unit.
+            ground: level ground at a known height, or None.
+            points: measured points, or None.
+            captured_ns: when the picture was taken. A step back in time begins anew.
+
+        Returns:
+            None as long as nothing was measured, and `hold_s` after the last measurement.
+
+        Raises:
+            ImageSizeError: depth that is not (H, W) of the camera.
+        """
+        if depth.depth_m.shape != (self.camera.height, self.camera.width):
+            raise ImageSizeError(
+                f"the depth map's shape is {depth.depth_m.shape}, "
+                f"the camera's is {(self.camera.height, self.camera.width)}"
+            )
+        passed_s = 0.0 if self._at_ns is None else (captured_ns - self._at_ns) * 1e-9
+        if passed_s < 0:
+            self.clear()
+            passed_s = 0.0
+        self._at_ns = captured_ns
+        self._filter.predict(passed_s)
+        if self.kind == "affine":
+            self._reshape(depth, ground, points, passed_s)
+            if self._shape is None:
+                return None
+            depth = depth.fitted(self._shape.scale, self._shape.shift)
+        self._listen(depth, ground, points, passed_s)
+        return self._estimate()
+
+    def _listen(
+        self, depth: DepthMap, ground: GroundHint | None, points: PointHints | None, passed_s: float
+    ) -> None:
+        """What both sources say of depth in the network's (or the fit's) unit."""
+        readings = []
+        by_points = None
+        if points is not None and len(points) >= LEAST_POINTS:
+            by_points = self._plausible_points(scale_from_points(sample(depth.depth_m, points, self.camera)))
+        if by_points is not None:
+            readings.append(
+                ScaleReading(POINTS, by_points.log_factor, by_points.shared_sigma, by_points.own_sigma)
+            )
+            share = 1.0 - math.exp(-passed_s) if self._scatter else 1.0
+            self._scatter += share * (by_points.scatter - self._scatter)
+        by_ground = None
+        if ground is not None:
+            by_ground = self._scaler.estimate(depth.depth_m, ground.attitude, ground.height_m)
+        if by_ground is not None:
+            lasting = math.hypot(by_ground.relative_sigma, _GROUND_DOUBT)
+            readings.append(ScaleReading(GROUND, math.log(by_ground.factor), lasting, 0.02))
+        if by_points is not None and by_ground is not None:
+            self._disagreement.add(math.log(by_ground.factor), by_points.log_factor, passed_s)
+        else:
+            self._disagreement.rest(passed_s)
+        self._filter.take(readings, passed_s)
+
+    def _plausible_points(self, found: PointScale | None) -> PointScale | None:
+        if found is None or self._plausible is None:
+            return found
+        low, high = self._plausible
+        return found if low <= math.exp(found.log_factor) <= high else None
+
+    def _reshape(
+        self, depth: DepthMap, ground: GroundHint | None, points: PointHints | None, passed_s: float
+    ) -> None:
+        """Fit scale and shift anew; the filter's log factor is against the fit, so it moves with it."""
+        values = depth.affine_inverse_depth
+        if values is None:
+            raise ValueError("an affine network's depth map has affine_inverse_depth; this one has none")
+        nothing = np.empty(0)
+        samples = AffineSamples(nothing, nothing, nothing, nothing)
+        if points is not None and len(points) >= LEAST_POINTS:
+            found = sample(values, points, self.camera, inverse=True)
+            worth = 1.0 / np.maximum(np.bincount(found.tile)[found.tile], 4.0) * 4.0
+            samples = samples.with_more(AffineSamples(found.network, 1.0 / found.depth_m, found.sigma, worth))
+        if ground is not None:
+            samples = samples.with_more(self._ground_samples(values, ground))
+        before = self._shape
+        self._shape = fit_affine(samples, before, passed_s)
+        if before is not None and self._shape is not None:
+            pivot = self._shape.pivot
+            held = before.inverse_m(pivot)
+            if held > 0:
+                self._filter.shift(math.log(self._shape.inverse_m(pivot) / held))
+
+    def _ground_samples(self, values: np.ndarray, ground: GroundHint) -> AffineSamples:
+        """The level ground's inverse depth at a grid of pixels that look down."""
+        start = self._stride // 2
+        network = values[start :: self._stride, start :: self._stride].ravel().astype(np.float64)
+        down = ground.attitude.level_from_body[2] @ self._rays
+        height_m = ground.camera_height_m
+        looks = (down > MIN_DEPRESSION * np.linalg.norm(self._rays, axis=0)) & np.isfinite(network)
+        if height_m < MIN_HEIGHT_M:
+            looks[:] = False
+        inverse = down[looks] / max(height_m, MIN_HEIGHT_M)
+        near_enough = inverse > 1.0 / MAX_PLANE_DEPTH_M
+        inverse, network = inverse[near_enough], network[looks][near_enough]
+        # All of the ground is worth as much as forty points in tiles of their own.
+        worth = np.full(len(network), min(1.0, 40.0 / max(len(network), 1)))
+        return AffineSamples(network, inverse, np.full(len(network), _GROUND_SIGMA), worth)
+
+    def _estimate(self) -> ScaleEstimate | None:
+        held = self._filter
+        if not held.known or held.age_s() > self.hold_s:
+            return None
+        sources = tuple(source for source in (GROUND, POINTS) if held.age_s(source) <= _RECENT_S)
+        scale, shift, covariance = math.exp(-held.log_factor), 0.0, (0.0, 0.0, 0.0)
+        if self._shape is not None:
+            theta = scale * np.array([self._shape.scale, self._shape.shift])
+            whole = scale**2 * self._shape.relative() + held.sigma**2 * np.outer(theta, theta)
+            covariance = float(whole[0, 0]), float(whole[0, 1]), float(whole[1, 1])
+            scale, shift = float(theta[0]), float(theta[1])
+        return ScaleEstimate(
+            scale,
+            shift,
+            held.sigma,
+            sources,
+            held.age_s(),
+            self._disagreement.text,
+            self._scatter,
+            covariance,
+        )
+
+
+def apply(estimate: ScaleEstimate, depth: DepthMap) -> DepthMap:
+    """Metric depth, its relative sigma with the doubt of the scale in it.
+
+    Where the network tells no doubt of its own, the scatter that points have shown stands for it.
+
+    Args:
+        estimate: of the same picture or of one shortly before.
+        depth: the network's answer, in its own unit.
+    """
+    if depth.affine_inverse_depth is not None:
+        fitted = depth.fitted(estimate.scale, estimate.shift)
+        raw = depth.affine_inverse_depth
+        first, both, second = (np.float32(each) for each in estimate.covariance)
+        variance = (first * raw + 2 * both) * raw + second
+        sigma = np.sqrt(np.maximum(variance, 0) * fitted.depth_m**2 + np.float32(estimate.scatter**2))
+        return DepthMap(fitted.depth_m, sigma.astype(np.float32))
+    own = np.float32(estimate.scatter) if depth.relative_sigma is None else depth.relative_sigma
+    metres = depth.depth_m * np.float32(estimate.factor)
+    sigma = np.hypot(own, np.float32(estimate.relative_sigma)).astype(np.float32)
+    return DepthMap(metres, np.where(np.isnan(metres), np.float32(np.nan), sigma))
