@@ -9,6 +9,7 @@ from service.settings.camera import CameraSettings
 from service.settings.log import LogSettings
 from service.settings.model import ModelSettings
 from service.settings.mount import MountSettings
+from service.settings.record import RecordSettings
 from service.settings.scan import ScanSettings
 from service.settings.section import Section
 from service.settings.vehicle import VehicleSettings
@@ -20,6 +21,7 @@ __all__ = [
     "LogSettings",
     "ModelSettings",
     "MountSettings",
+    "RecordSettings",
     "ScanSettings",
     "Settings",
     "VehicleSettings",
@@ -37,4 +39,5 @@ class Settings(Section):
     scan: ScanSettings = Field(default_factory=ScanSettings)
     autopilot: AutopilotSettings = Field(default_factory=AutopilotSettings)
     zenoh: ZenohSettings = Field(default_factory=ZenohSettings)
+    record: RecordSettings = Field(default_factory=RecordSettings)
     log: LogSettings = Field(default_factory=LogSettings)
