@@ -19,3 +19,7 @@ class LinkError(UavDepthError):
 
 class PublisherError(UavDepthError):
     """A Zenoh endpoint that cannot be opened."""
+
+
+class RecordError(UavDepthError):
+    """A record or telemetry log that cannot be read, written or replayed."""
