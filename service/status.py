@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from service.autopilot.service_state import ServiceState
 from service.cameras.reader import CameraStatus
 from service.publisher.publisher import PublisherStatus
 from service.scale_status import ScaleStatus
+from service.telemetry import Telemetry
 from service.trouble import Trouble
 
 _MIB = 1024 * 1024
@@ -63,6 +65,12 @@ class ServiceStatus:
         link: the MAVLink link.
         publisher: Zenoh; None if switched off.
         memory_mib: resident memory, 0 where the system does not tell.
+        altitude_m: height above the origin of the autopilot's local frame; None if not heard.
+        speed_mps: speed over ground; None if not heard.
+        recording: whether a record is being written; None where no recorder is set up.
+        recording_detail: what is wrong with the record, in words; empty if nothing.
+        stream_profile: what is sent to the ground; None if it has no name.
+        cp_delay_s, margin_m: CP_DELAY and margin that the measured latency asks for; None if not known.
     """
 
     vehicle: str
@@ -85,6 +93,24 @@ class ServiceStatus:
     link: LinkStatus
     publisher: PublisherStatus | None
     memory_mib: float
+    altitude_m: float | None = None
+    speed_mps: float | None = None
+    recording: bool | None = None
+    recording_detail: str = ""
+    stream_profile: str | None = None
+    cp_delay_s: float | None = None
+    margin_m: float | None = None
+
+
+def altitude_m(telemetry: Telemetry) -> float | None:
+    """Height above the origin of the autopilot's local frame, metres; None if not heard."""
+    return None if telemetry.position_ned_m is None else -telemetry.position_ned_m[2]
+
+
+def speed_mps(telemetry: Telemetry) -> float | None:
+    """Speed over ground, metres per second; None if not heard."""
+    velocity = telemetry.velocity_ned_mps
+    return None if velocity is None else math.hypot(velocity[0], velocity[1])
 
 
 def resident_memory_mib() -> float:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Final, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from service.errors import PublisherError
 from uavdepth.camera import CameraModel
@@ -23,6 +23,17 @@ WIRE_VERSION: Final = 1
 
 _MAX_SAMPLE_BYTES = 65_536
 """No scan, header or status is near it: larger text from the network is not even parsed."""
+
+_MAX_WORDS = 500
+_MAX_SIDE = 16_384
+_MAX_AGE_MS = 1e9
+_MAX_DISTANCE_M = 10_000.0
+
+Words = Annotated[str, AfterValidator(lambda text: text[:_MAX_WORDS])]
+"""Text for people: cut at both ends of the way, so that none is refused and none floods a viewer."""
+
+Nanoseconds = Annotated[int, Field(ge=-(2**63), lt=2**63)]
+Count = Annotated[int, Field(ge=0, lt=2**63)]
 
 
 class WireError(PublisherError):
@@ -64,9 +75,9 @@ class Stamp(_Message):
         age_ms: time from capture to publishing, milliseconds.
     """
 
-    index: int = Field(ge=0)
-    captured_ns: int
-    age_ms: float = Field(ge=0.0)
+    index: Count
+    captured_ns: Nanoseconds
+    age_ms: float = Field(ge=0.0, le=_MAX_AGE_MS)
 
 
 class Intrinsics(BaseModel):
@@ -74,13 +85,13 @@ class Intrinsics(BaseModel):
 
     model_config = ConfigDict(frozen=True, allow_inf_nan=False)
 
-    width: int
-    height: int
+    width: int = Field(ge=1, le=_MAX_SIDE)
+    height: int = Field(ge=1, le=_MAX_SIDE)
     fx: float
     fy: float
     cx: float
     cy: float
-    distortion: tuple[float, ...] = ()
+    distortion: tuple[float, ...] = Field(default=(), max_length=16)
 
     @classmethod
     def of(cls, camera: CameraModel) -> Intrinsics:
@@ -134,13 +145,15 @@ class ScanSample(Stamp):
     """
 
     trusted: bool
-    trouble: str | None = None
-    min_distance_m: float
-    max_distance_m: float
-    first_bearing_deg: float = FIRST_BEARING_DEG
-    step_deg: float = SECTOR_WIDTH_DEG
+    trouble: Words | None = None
+    min_distance_m: float = Field(ge=0.0, le=_MAX_DISTANCE_M)
+    max_distance_m: float = Field(gt=0.0, le=_MAX_DISTANCE_M)
+    first_bearing_deg: float = Field(default=FIRST_BEARING_DEG, ge=-360.0, le=360.0)
+    step_deg: float = Field(default=SECTOR_WIDTH_DEG, gt=0.0, le=360.0)
     state: str = Field(pattern=rf"^[012]{{{SECTOR_COUNT}}}$")
-    distance_cm: tuple[int, ...] = Field(min_length=SECTOR_COUNT, max_length=SECTOR_COUNT)
+    distance_cm: tuple[Annotated[int, Field(ge=-1, le=10_000_000)], ...] = Field(
+        min_length=SECTOR_COUNT, max_length=SECTOR_COUNT
+    )
 
     @model_validator(mode="after")
     def _obstacles_have_distances(self) -> Self:
@@ -198,34 +211,58 @@ class StatusSample(_Message):
         model_failures: pictures that the network failed on.
         scale_factor, scale_relative_sigma, scale_age_s: metric scale of the newest picture; None if it has
             none. A network that answers in metres has the factor 1 and a sigma of its own.
+        scale_sources: what told it, e.g. "ground", "points".
         height_m, mode, armed: of the vehicle; None if not heard.
+        altitude_m: height above the origin of the autopilot's local frame (where it was started).
+        speed_mps: speed over ground.
         camera, camera_detail: state of the camera.
         link_connected, autopilot, system_id: of the MAVLink link.
         link_detail: what is wrong with it, in words; empty if nothing.
+        obstacle_profile: layout of OBSTACLE_DISTANCE: "ardupilot", "px4", "px4-legacy".
+        obstacle_rate_hz: OBSTACLE_DISTANCE messages a second.
+        link_in_bytes_per_s, link_out_bytes_per_s: of the MAVLink link.
+        link_signed: its packets are signed, and only signed ones are believed.
+        recording: whether a record is being written; None where no recorder is set up.
+        recording_detail: what is wrong with it, in words; empty if nothing.
+        stream_profile: what is sent to the ground: "full", "thin", "scan-only".
+        cp_delay_s, margin_m: CP_DELAY and margin that the measured latency asks for.
         memory_mib: resident memory.
     """
 
-    vehicle: str
-    state: str
-    trouble: str | None = None
+    vehicle: Words
+    state: Words
+    trouble: Words | None = None
     uptime_s: float
     frames_per_s: float
-    obstacle_messages: int
+    obstacle_messages: Count
     latency_ms_p50: float | None = None
     latency_ms_p95: float | None = None
-    dropped_frames: int = 0
-    dropped_samples: int = 0
-    model_failures: int = 0
+    dropped_frames: Count = 0
+    dropped_samples: Count = 0
+    model_failures: Count = 0
     scale_factor: float | None = None
     scale_relative_sigma: float | None = None
     scale_age_s: float | None = None
+    scale_sources: tuple[Words, ...] = Field(default=(), max_length=8)
     height_m: float | None = None
-    mode: str | None = None
+    mode: Words | None = None
     armed: bool | None = None
-    camera: str
-    camera_detail: str = ""
+    altitude_m: float | None = None
+    speed_mps: float | None = None
+    camera: Words
+    camera_detail: Words = ""
     link_connected: bool
-    autopilot: str | None = None
-    system_id: int | None = None
-    link_detail: str = ""
+    autopilot: Words | None = None
+    system_id: Count | None = None
+    link_detail: Words = ""
+    obstacle_profile: Words | None = None
+    obstacle_rate_hz: float | None = None
+    link_in_bytes_per_s: float | None = None
+    link_out_bytes_per_s: float | None = None
+    link_signed: bool | None = None
+    recording: bool | None = None
+    recording_detail: Words = ""
+    stream_profile: Words | None = None
+    cp_delay_s: float | None = None
+    margin_m: float | None = None
     memory_mib: float
