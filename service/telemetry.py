@@ -19,6 +19,8 @@ class Telemetry:
         velocity_ned_mps: velocity, metres per second.
         armed: motors armed, from HEARTBEAT.
         mode: the autopilot's flight mode by name, from HEARTBEAT.
+        epoch: changes when the autopilot has rebooted or its clock was taken anew: what was said in another
+            epoch does not belong to this one.
     """
 
     at_ns: int
@@ -28,3 +30,4 @@ class Telemetry:
     velocity_ned_mps: tuple[float, float, float] | None = None
     armed: bool | None = None
     mode: str | None = None
+    epoch: int = 0
