@@ -1,0 +1,1 @@
+"""How well metres come from the vehicle's motion: flights with exact depth, recorded flights, KITTI."""
