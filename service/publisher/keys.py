@@ -7,6 +7,10 @@ DEPTH = "depth"
 SCAN = "scan"
 STATUS = "status"
 CAMERA = "camera"
+VIDEO = "video"
+RECEIVED = "received"
+"""What a ground station says has arrived: the one key that viewers write."""
+
 ALIVE = "alive"
 """Liveliness token: there while the vehicle's session lives."""
 

@@ -31,19 +31,25 @@ _COMPARISON_WORDS = {
 }
 
 
-def load_settings(path: Path | None, overrides: Iterable[str] = ()) -> Settings:
+_NO_CAMERA = {"source": "none", "horizontal_fov_deg": 90.0}
+
+
+def load_settings(path: Path | None, overrides: Iterable[str] = (), *, needs_camera: bool = True) -> Settings:
     """Read the configuration.
 
     Args:
         path: TOML file, or None to start from the defaults.
         overrides: `section.key=value`, applied over the file in order.
+        needs_camera: False for programs on the ground, whose file need not have `[camera]`.
 
     Raises:
         ConfigError: a file that cannot be read, broken TOML, an unknown key, a value of the wrong type
             or out of bounds; the text names the file and each key.
     """
     table = _read_toml(path) if path is not None else {}
-    table.setdefault("camera", {})  # so that an empty file is told "[camera] source: is missing"
+    table.setdefault(
+        "camera", {} if needs_camera else dict(_NO_CAMERA)
+    )  # so that an empty file is told "[camera] source: is missing"
     given = [parse_override(text) for text in overrides]
     for section, key, value in given:
         inside = table.setdefault(section, {})

@@ -1,0 +1,1 @@
+"""Who may speak: certificates of a fleet, passwords and the access list."""
