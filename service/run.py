@@ -23,6 +23,7 @@ from service.monitor import Monitor
 from service.pipeline import Perception, PerceptionResult
 from service.progress import Progress
 from service.publisher.publisher import ZenohPublisher
+from service.recorder.recorder import Recorder
 from service.settings import Settings
 from service.status import Drops, ServiceStatus, resident_memory_mib
 from service.status_sample import status_sample
@@ -80,7 +81,13 @@ class Service:
     ) -> None:
         self._settings = settings
         self._clock = MonotonicClock() if clock is None else clock
-        self._link: Link = AutopilotLink(settings.autopilot, self._clock) if link is None else link
+        self._recorder: Recorder | None = None
+        if settings.record.enabled:
+            self._recorder = Recorder(settings, self._clock, self._model_card)
+        if link is None:
+            tap = None if self._recorder is None else self._recorder.offer_packets
+            link = AutopilotLink(settings.autopilot, self._clock, tap)
+        self._link: Link = link
         self._frames: LatestSlot[Frame] = LatestSlot()
         if camera is None:
             camera = make_camera(
@@ -101,14 +108,14 @@ class Service:
         self._started_ns = self._clock.now_ns()
         self._progress = Progress(self._started_ns)
         self._thread = threading.Thread(target=self._perceive, name="perception", daemon=True)
-        publisher = self._publisher
+        told = self._publisher is not None or self._recorder is not None
         self._monitor = Monitor(
             self._clock,
             self._link,
             self._reader,
             self._progress,
             self._started_ns,
-            None if publisher is None else lambda: publisher.offer_status(status_sample(self.status())),
+            self._tell_status if told else None,
             round(1e9 / settings.zenoh.status_rate_hz),
         )
 
@@ -130,6 +137,8 @@ class Service:
             if self._publisher is not None:
                 self._publisher.start()
             self._perception = self._load_perception(self._settings)
+            if self._recorder is not None:
+                self._recorder.start()
         except UavDepthError:
             self.stop()
             raise
@@ -161,6 +170,8 @@ class Service:
             self._link.say(SEVERITY_WARNING, "uavdepth OFF: stopped")
             threading.Event().wait(_LAST_WORDS_S)
         self._link.close()
+        if self._recorder is not None:
+            self._recorder.stop()
         with self._subscribers_lock:
             for slot in self._subscribers:
                 slot.close()
@@ -192,6 +203,7 @@ class Service:
         now_ns = self._clock.now_ns()
         link = self._link.status()
         progress, publisher = self._progress, self._publisher
+        record = None if self._recorder is None else self._recorder.status()
         result = progress.result
         return ServiceStatus(
             vehicle=self._settings.vehicle.name,
@@ -214,6 +226,8 @@ class Service:
             link=link,
             publisher=None if publisher is None else publisher.status,
             memory_mib=resident_memory_mib(),
+            recording=None if record is None else record.recording,
+            recording_detail="" if record is None else record.problem,
         )
 
     # -- the perception thread
@@ -243,6 +257,8 @@ class Service:
         if result.trusted and self._link.send_obstacles(result.scan, frame.captured_ns):
             self._progress.sent(frame.captured_ns, self._clock.now_ns())
         self._progress.measured(result, begun_ns, done_ns)
+        if self._recorder is not None:
+            self._recorder.offer(result, begun_ns, done_ns)
         self._hand_out(result)
 
     def _stands_ready(self, result: PerceptionResult) -> bool:
@@ -254,6 +270,17 @@ class Service:
             return False
         rangefinder_hz = self._link.status().rates_hz.get("DISTANCE_SENSOR", 0.0)
         return result.telemetry.armed is False and rangefinder_hz > 0
+
+    def _model_card(self) -> str | None:
+        card = getattr(self._perception, "model_card", None)
+        return None if card is None else card.to_json()
+
+    def _tell_status(self) -> None:
+        sample = status_sample(self.status())
+        if self._publisher is not None:
+            self._publisher.offer_status(sample)
+        if self._recorder is not None:
+            self._recorder.offer_status(sample.encode())
 
     def _hand_out(self, result: PerceptionResult) -> None:
         if self._publisher is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -19,6 +20,9 @@ def run(
         str | None, typer.Option(help="Camera in place of the configured one, e.g. 0 or sim:city:3.")
     ] = None,
     autopilot: AutopilotOption = None,
+    record: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Record the flight into this folder.")
+    ] = None,
     overrides: OverridesOption = None,
 ) -> None:
     """Fly: camera to depth to OBSTACLE_DISTANCE and Zenoh, until interrupted."""
@@ -33,6 +37,8 @@ def run(
         given.append(f"camera.source={camera}")
     if autopilot is not None:
         given.append(f"autopilot.endpoint={autopilot}")
+    if record is not None:
+        given += [f"record.folder={record}", "record.enabled=true"]
     settings = load_settings(config, given)
     set_up_logging(settings.log)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import select
 import socket
 import threading
+from collections.abc import Callable, Hashable
 from pathlib import Path
 
 import structlog
@@ -30,6 +31,9 @@ _MAX_PENDING_BYTES = 400
 
 _log = structlog.get_logger("autopilot")
 
+Tap = Callable[[bytes, int, bool, Hashable], None]
+"""Gets bytes of the line, when they passed, whether they left, and whose they are. Must not wait or raise."""
+
 
 class AutopilotLink:
     """Talks to the autopilot in the background and survives whatever the line does.
@@ -39,11 +43,13 @@ class AutopilotLink:
     Args:
         settings: the `[autopilot]` section.
         clock: the service's clock, by which frames are stamped too.
+        tap: gets every byte of the line, for a recorder.
     """
 
-    def __init__(self, settings: AutopilotSettings, clock: Clock) -> None:
+    def __init__(self, settings: AutopilotSettings, clock: Clock, tap: Tap | None = None) -> None:
         self._settings = settings
         self._clock = clock
+        self._tap = tap
         self._session = LinkSession(settings)
         self._lock = threading.Lock()
         self._stop = threading.Event()
@@ -198,6 +204,11 @@ class AutopilotLink:
             destination = self._session.destination
         for frame in frames:
             transport.send(frame, destination)
+        if self._tap is not None:
+            for data, source in arrived:
+                self._tap(data, arrival_ns, False, source)
+            for frame in frames:
+                self._tap(frame, now_ns, True, destination)
         self._tell()
 
     def _tell(self) -> None:
