@@ -17,6 +17,10 @@ class ImageSizeError(UavDepthError, ValueError):
     """An image or depth map whose size is not the camera's."""
 
 
+class ImageMaskError(UavDepthError, ValueError):
+    """A mask of the camera's picture that cannot be read or does not fit it."""
+
+
 class CalibrationError(UavDepthError, ValueError):
     """A board, pictures or a solution from which no camera can be calibrated."""
 

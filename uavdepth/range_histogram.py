@@ -47,11 +47,14 @@ class RangeHistogram:
         self._window_end = np.minimum(reach, self._bins)
         # Written by `add`, counted at once by `nearest_m`; int64 because bincount would copy all else.
         self._cells = np.zeros(capacity, dtype=np.int64)
+        self._doubt = np.zeros(capacity, dtype=np.float32)
+        self._doubted = False
         self._used = 0
 
     def clear(self) -> None:
         """Forget every point."""
         self._used = 0
+        self._doubted = False
 
     def add(
         self,
@@ -59,6 +62,7 @@ class RangeHistogram:
         right_m: NDArray[np.float32],
         range_m: NDArray[np.float32],
         wanted: NDArray[np.bool_],
+        shortening: NDArray[np.float32] | None = None,
     ) -> None:
         """Take in points.
 
@@ -66,6 +70,7 @@ class RangeHistogram:
             forward_m, right_m: (N,) float32 horizontal coordinates in the level frame.
             range_m: (N,) float32 horizontal distance; below max_distance_m where wanted.
             wanted: (N,) bool, the points to count; the values of the others do not matter.
+            shortening: (N,) float32 share of its distance by which each point may be nearer, 0 to 1.
         """
         direction = np.arctan2(right_m, forward_m)
         direction *= _PER_RADIAN
@@ -79,6 +84,9 @@ class RangeHistogram:
         cell -= self._first_bin - 1  # cell 0 takes what is not wanted
         end = self._used + len(cell)
         np.multiply(cell, wanted, out=self._cells[self._used : end])
+        if shortening is not None:
+            self._doubt[self._used : end] = shortening
+            self._doubted = True
         self._used = end
 
     def nearest_m(self, needed: NDArray[np.int64]) -> NDArray[np.float32]:
@@ -88,7 +96,9 @@ class RangeHistogram:
             needed: (bins,) points that make an obstacle at each bin's distance.
 
         Returns:
-            (72,) float32 distance in metres, rounded down to a bin's edge; NaN where nothing is found.
+            (72,) float32 distance in metres, rounded down to a bin's edge, and shortened by the mean of what
+            the supporting points may be nearer; NaN where nothing is found. Doubt shortens a distance only
+            once it is found: it neither hides a thing nor splits it.
         """
         nearest = np.full(SECTOR_COUNT, np.nan, dtype=np.float32)
         # One row more than directions: straight behind is reached from both sides.
@@ -102,6 +112,7 @@ class RangeHistogram:
         np.cumsum(counts[rows], axis=1, out=below[:, 1:])
         support = below.take(self._window_end, axis=1)
         support -= below[:, :-1]
+        doubt = self._summed_doubt(size, rows) if self._doubted else None
         enough = support >= needed
         starts = enough.argmax(axis=1)
         for row in np.flatnonzero(enough.any(axis=1)):
@@ -109,5 +120,17 @@ class RangeHistogram:
             quantile = int(NEAR_QUANTILE * support[row, start])
             rank = below[row, start] + max(int(needed[start]), quantile)
             distance = self.edges_m[np.searchsorted(below[row], rank) - 1]
+            if doubt is not None:
+                mean = (doubt[row, self._window_end[start]] - doubt[row, start]) / support[row, start]
+                distance *= np.float32(1.0 - mean)
             nearest[(rows[row] - _ROWS_TO_FIRST_BEARING) % SECTOR_COUNT] = distance
         return nearest
+
+    def _summed_doubt(self, size: int, rows: NDArray[np.intp]) -> NDArray[np.float64]:
+        """(rows, bins + 1) shortening of all points below each bin."""
+        total = np.bincount(self._cells[: self._used], self._doubt[: self._used], size)[1:size]
+        total = total.reshape(SECTOR_COUNT + 1, self._bins)
+        total[0] += total[-1]
+        below = np.zeros((rows.size, self._bins + 1))
+        np.cumsum(total[rows], axis=1, out=below[:, 1:])
+        return below

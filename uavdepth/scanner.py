@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -30,6 +31,10 @@ FREE_SHARE = 0.7
 """Share of the band's height that must be seen free before an element is clear. The flight level
 itself is then always among what is seen: of the default band it lies at 43 % from the top."""
 
+LARGEST_SHORTENING = 0.5
+"""However doubtful a distance, at most so much of it is taken off: an obstacle at no distance at all would
+stop the vehicle for good."""
+
 _GROUND_STRIDE = 4
 _ROWS_WORKED_ON = 160
 """Rows are joined in groups, the nearest pixel of each group standing for it, until about so many are
@@ -37,6 +42,8 @@ left: nothing near is lost, and the time of a scan does not grow with the pictur
 
 _CHUNK = 32768
 """Points worked on at a time, so that the intermediate arrays stay in the processor's cache."""
+
+_Pixel = TypeVar("_Pixel", np.float32, np.bool_)
 
 _NEIGHBOURS = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], dtype=np.uint8)
 
@@ -57,8 +64,13 @@ class ObstacleScanner:
       from the band's top to its bottom at maximum distance, by at least `FREE_SHARE`, with known
       depth that ends on the ground or beyond maximum distance. Near the vehicle the band is taller
       than any camera's picture: clear speaks of the part that the camera sees;
-    - UNKNOWN else: outside the picture, partly outside, unknown depth, or tilted away from the
-      flight level.
+    - UNKNOWN else: outside the picture, partly outside, masked, unknown depth, depth that may end short
+      of what makes it clear, or tilted away from the flight level.
+
+    Depth d with a relative standard deviation sigma may be as near as d * (1 - sigma_factor * sigma). That is
+    where an obstacle is told, and what a clear pixel must reach the ground or maximum distance with. Whether
+    something is an obstacle is for d itself to say: doubt makes no obstacle of far things, and near things
+    stay obstacles however doubtful.
 
     Args:
         camera, mount: the camera and how it sits on the vehicle.
@@ -69,9 +81,13 @@ class ObstacleScanner:
             `SMALLEST_SIZE_M` there, but at least 6.
         ground_tolerance: relative error of depth that must not make an obstacle of the ground, 0 to
             0.5. What rises less than this share of the height is lost among the ground.
+        sigma_factor: standard deviations that distances are shortened by, 0 to 5; 0: uncertainty is ignored.
+        mask: (H, W) bool, True where the picture is not to be looked at (see `load_image_mask`): unknown.
 
     Raises:
-        ScanError: distances that are not finite with 0 < min < max, a band without height.
+        ScanError: distances that are not finite with 0 < min < max, a band without height, a sigma_factor
+            outside its limits.
+        ImageSizeError: a mask that is not (H, W) of the camera.
 
     Example:
         scanner = ObstacleScanner(camera, CameraMount(pitch_deg=-10))
@@ -88,6 +104,8 @@ class ObstacleScanner:
         above_m: float = 1.5,
         min_pixels: int | None = None,
         ground_tolerance: float = GROUND_DEPTH_SHARE,
+        sigma_factor: float = 1.0,
+        mask: NDArray[np.bool_] | None = None,
     ) -> None:
         if not (math.isfinite(max_distance_m) and 0.01 <= min_distance_m < max_distance_m <= 599.0):
             raise ScanError(
@@ -100,8 +118,12 @@ class ObstacleScanner:
             raise ScanError(f"min_pixels is {min_pixels}: at least 1 is needed")
         if not 0.0 <= ground_tolerance <= 0.5:
             raise ScanError(f"ground_tolerance is {ground_tolerance}: 0 to 0.5 is needed")
+        if not 0.0 <= sigma_factor <= 5.0:
+            raise ScanError(f"sigma_factor is {sigma_factor}: 0 to 5 is needed")
         self.camera = camera
         self.mount = mount
+        self._sigma_factor = np.float32(sigma_factor)
+        self._mask = None if mask is None else self._of_camera("mask", np.array(mask, dtype=np.bool_))
         self.min_distance_m = float(min_distance_m)
         self.max_distance_m = float(max_distance_m)
         self.below_m = float(below_m)
@@ -120,7 +142,11 @@ class ObstacleScanner:
         self._bearings = sector_bearings_deg()
 
     def scan(
-        self, depth_m: NDArray[np.floating], attitude: Attitude, height_m: float | None = None
+        self,
+        depth_m: NDArray[np.floating],
+        attitude: Attitude,
+        height_m: float | None = None,
+        relative_sigma: NDArray[np.floating] | None = None,
     ) -> ObstacleScan:
         """Scan one depth map.
 
@@ -131,28 +157,47 @@ class ObstacleScanner:
             height_m: vehicle's origin above ground, vertically. None, NaN or not above 0: not known;
                 then the ground is looked for in the depth itself, and where it is not found beyond
                 doubt, whatever lies in the height band is an obstacle.
+            relative_sigma: (H, W) one standard deviation of depth over depth; what is NaN is not clear.
+                None: depth is taken as exact.
 
         Raises:
-            ImageSizeError: depth that is not (H, W) of the camera.
+            ImageSizeError: depth or uncertainty that is not (H, W) of the camera.
             ScanError: roll or pitch that is not finite.
         """
-        if np.shape(depth_m) != (self.camera.height, self.camera.width):
-            raise ImageSizeError(
-                f"the depth map's shape is {np.shape(depth_m)}, "
-                f"the camera's is {(self.camera.height, self.camera.width)}"
-            )
+        depth = self._of_camera("depth map", np.ascontiguousarray(depth_m, dtype=np.float32))
         if not (math.isfinite(attitude.roll_rad) and math.isfinite(attitude.pitch_rad)):
             raise ScanError(f"attitude is {attitude}: a finite roll and pitch are needed")
-        depth = np.ascontiguousarray(depth_m, dtype=np.float32)
+        if self._mask is not None:
+            depth = np.where(self._mask, np.float32(np.nan), depth)
+        shortening = None
+        if relative_sigma is not None and self._sigma_factor > 0:
+            sigma = np.asarray(relative_sigma, dtype=np.float32)
+            shortening = self._of_camera("uncertainty", sigma) * self._sigma_factor
         level = attitude.level_from_body
         ground = self._ground(depth, level, height_m)
 
         joined = _nearest_of_rows(self._without_speckles(depth), self._together)
-        distance = self._nearest(joined.ravel(), level, ground)
-        clear = self._seen_free(depth.ravel(), level, ground)
+        distance = self._nearest(joined.ravel(), level, ground, self._told_shortening(shortening))
+        clear = self._seen_free(depth.ravel(), level, ground, shortening)
         state = np.where(clear, SectorState.CLEAR, SectorState.UNKNOWN).astype(np.uint8)
         state[~np.isnan(distance)] = SectorState.OBSTACLE
         return ObstacleScan(distance, state, self._bearings, self.min_distance_m, self.max_distance_m)
+
+    def _of_camera(self, name: str, picture: NDArray[_Pixel]) -> NDArray[_Pixel]:
+        if picture.shape != (self.camera.height, self.camera.width):
+            raise ImageSizeError(
+                f"the {name}'s shape is {picture.shape}, "
+                f"the camera's is {(self.camera.height, self.camera.width)}"
+            )
+        return picture
+
+    def _told_shortening(self, shortening: NDArray[np.float32] | None) -> NDArray[np.float32] | None:
+        """(joined pixels,) share of an obstacle's distance to take off, 0 to `LARGEST_SHORTENING`."""
+        if shortening is None:
+            return None
+        joined = -_nearest_of_rows(-shortening, self._together)  # the most doubtful row stands for its group
+        joined[np.isnan(joined)] = LARGEST_SHORTENING
+        return np.clip(joined, 0.0, LARGEST_SHORTENING, out=joined).ravel()
 
     def _without_speckles(self, depth: NDArray[np.float32]) -> NDArray[np.float32]:
         """Depth with unknown as +inf, and single pixels pushed back to the nearest of their neighbours.
@@ -166,7 +211,11 @@ class ObstacleScanner:
         return np.maximum(known, neighbours, out=known)
 
     def _nearest(
-        self, depth: NDArray[np.float32], level: NDArray[np.float64], ground: LevelGround | None
+        self,
+        depth: NDArray[np.float32],
+        level: NDArray[np.float64],
+        ground: LevelGround | None,
+        shortening: NDArray[np.float32] | None,
     ) -> NDArray[np.float32]:
         """(72,) distance of the nearest obstacle, NaN for none, from every pixel."""
         self._histogram.clear()
@@ -175,17 +224,29 @@ class ObstacleScanner:
             points, range_m = self._level_points(self._joined_rays[:, chunk], depth[chunk], level)
             obstacle = self._is_obstacle(points[2], range_m, ground)
             if obstacle.any():
-                self._histogram.add(points[0], points[1], range_m, obstacle)
+                doubt = None if shortening is None else shortening[chunk]
+                self._histogram.add(points[0], points[1], range_m, obstacle, doubt)
         return self._histogram.nearest_m(self._needed)
 
     def _seen_free(
-        self, depth: NDArray[np.float32], level: NDArray[np.float64], ground: LevelGround | None
+        self,
+        depth: NDArray[np.float32],
+        level: NDArray[np.float64],
+        ground: LevelGround | None,
+        shortening: NDArray[np.float32] | None,
     ) -> NDArray[np.bool_]:
         """(72,) whether the band is seen and free up to maximum distance."""
         probe = self._view.probe(level)
         probed = depth[probe.pixel]
-        points, range_m = self._level_points(self._rays[:, probe.pixel], probed, level)
+        rays = self._rays[:, probe.pixel]
+        points, range_m = self._level_points(rays, probed, level)
         free = (probed > 0) & ~self._is_obstacle(points[2], range_m, ground)
+        if shortening is not None:
+            # NaN fails: no claim is not a small claim.
+            doubt = shortening.ravel()[probe.pixel]
+            certain = (doubt >= 0) & (doubt < 1)
+            points, range_m = self._level_points(rays, probed * (1 - doubt), level)
+            free &= certain & ~self._is_obstacle(points[2], range_m, ground)
         return seen_sectors(free, probe.cell, FREE_SHARE)
 
     def _level_points(

@@ -42,6 +42,31 @@ class ScanSettings(Section):
         title="Height band above, metres",
         description="Obstacles count up to so far above the vehicle's flight level.",
     )
+    sigma_factor: float = Field(
+        default=1.0,
+        ge=0.0,
+        le=5.0,
+        title="Caution about distances, standard deviations",
+        description="Distances are told as d * (1 - sigma_factor * sigma), sigma being the network's own "
+        "relative uncertainty, and a direction is clear only if it would be at that distance too. "
+        "0 ignores uncertainty.",
+    )
+    max_ground_slope_deg: float = Field(
+        default=15.0,
+        ge=0.0,
+        le=25.0,
+        title="Steepest ground, degrees",
+        description="Ground that rises no steeper is no obstacle while it stays below the flight level. "
+        "0 takes all ground for level.",
+    )
+    memory_s: float = Field(
+        default=0.5,
+        ge=0.0,
+        le=0.5,
+        title="Memory for obstacles, seconds",
+        description="How long an obstacle that has left the picture stays in the scan, carried along with "
+        "the vehicle's motion. It needs LOCAL_POSITION_NED. 0 switches it off.",
+    )
     max_scale_sigma: float = Field(
         default=0.5,
         gt=0.0,

@@ -65,6 +65,14 @@ def pole(
     return meet
 
 
+def turned(solid: Solid, by_deg: float) -> Solid:
+    """The solid turned clockwise, seen from above, round the vehicle."""
+    angle = np.radians(by_deg)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    back = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    return lambda origin, rays: solid(back @ origin, rays @ back.T)
+
+
 def depth_of(
     solids: Sequence[Solid], camera: CameraModel, mount: CameraMount, attitude: Attitude
 ) -> NDArray[np.float32]:
