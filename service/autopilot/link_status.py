@@ -28,6 +28,11 @@ class LinkStatus:
         sent_obstacles: scans handed to the line.
         obstacle_rate_hz: the same a second, over two seconds.
         obstacle_rate_limit_hz: the most that is sent a second: what was wanted, or what the line carries.
+        obstacle_delay_ms: half and 19 of 20 scans left within so many milliseconds of their capture; None
+            before the first.
+        transport_ms: how long a message is under way to the autopilot, learnt; milliseconds.
+        not_made_good: scans that left as they were at capture, at least in part, because attitude or
+            velocity was not known.
         byte_budget_per_s: bytes a second that the line may carry; 0 for no limit.
         dropped_messages: messages that found no room on the line before they were too old.
         refused_obstacles: scans that were not sent, by reason.
@@ -59,6 +64,9 @@ class LinkStatus:
     sent_obstacles: int = 0
     obstacle_rate_hz: float = 0.0
     obstacle_rate_limit_hz: float = 0.0
+    obstacle_delay_ms: tuple[float, float] | None = None
+    transport_ms: float = 0.0
+    not_made_good: int = 0
     byte_budget_per_s: int = 0
     dropped_messages: int = 0
     refused_obstacles: Mapping[str, int] = field(default_factory=dict)

@@ -95,19 +95,28 @@ class MotionHistory:
         """Time of the newest attitude."""
         return self._attitudes.newest_ns
 
-    def attitude_at(self, boot_ns: int) -> Attitude | None:
-        """Attitude at `boot_ns`, or None where no message is near enough."""
+    def attitude_at(self, boot_ns: int, carried_ns: int | None = None) -> Attitude | None:
+        """Attitude at `boot_ns`, or None where no message is near enough.
+
+        Args:
+            carried_ns: furthest that a message is carried by its rates, instead of the limit.
+        """
         before, after = self._attitudes.around(boot_ns)
         if before and after and after[0] - before[0] <= self._limits.gap_ns:
             fraction = (boot_ns - before[0]) / (after[0] - before[0])
             return to_attitude(slerp(before[1].quaternion, after[1].quaternion, fraction))
-        near = _nearer(before, after, boot_ns, self._limits.extrapolation_ns)
+        carried_ns = self._limits.extrapolation_ns if carried_ns is None else carried_ns
+        near = _nearer(before, after, boot_ns, carried_ns)
         if near is None:
             return None
         return to_attitude(turned(near[1].quaternion, near[1].body_rates_rps, (boot_ns - near[0]) * 1e-9))
 
-    def position_at(self, boot_ns: int) -> tuple[Vector, Vector] | None:
-        """Position (NED, metres) and velocity (NED, metres a second) at `boot_ns`, or None."""
+    def position_at(self, boot_ns: int, carried_ns: int | None = None) -> tuple[Vector, Vector] | None:
+        """Position (NED, metres) and velocity (NED, metres a second) at `boot_ns`, or None.
+
+        Args:
+            carried_ns: furthest that a message is carried by its velocity, instead of the limit.
+        """
         before, after = self._positions.around(boot_ns)
         if before and after and after[0] - before[0] <= self._limits.gap_ns:
             fraction = (boot_ns - before[0]) / (after[0] - before[0])
@@ -115,7 +124,8 @@ class MotionHistory:
                 _mix(before[1].position_ned_m, after[1].position_ned_m, fraction),
                 _mix(before[1].velocity_ned_mps, after[1].velocity_ned_mps, fraction),
             )
-        near = _nearer(before, after, boot_ns, self._limits.extrapolation_ns)
+        carried_ns = self._limits.extrapolation_ns if carried_ns is None else carried_ns
+        near = _nearer(before, after, boot_ns, carried_ns)
         if near is None:
             return None
         seconds = (boot_ns - near[0]) * 1e-9

@@ -84,33 +84,32 @@ class ObstacleSender:
             return Refusal.NO_ATTITUDE
         return self._gate.refusal(captured_ns, now_ns)
 
+    def accept(self, scan: ObstacleScan, captured_ns: int, now_ns: int) -> None:
+        """The scan may be sent, and counts as sent."""
+        self._limits_m = (scan.min_distance_m, scan.max_distance_m)
+        self._gate.passed(captured_ns, now_ns)
+
     def messages(
         self,
         scan: ObstacleScan,
         captured_ns: int,
-        now_ns: int,
         time_usec: int,
         profile: AutopilotProfile,
         attitude: Attitude | None,
     ) -> Sequence[mavlink.MAVLink_message]:
-        """The messages for a scan that may be sent; it counts as sent.
+        """The messages for a scan.
 
         Args:
             time_usec: capture time on the autopilot's clock, 0 where that is not known.
             profile: the autopilot's layout.
-            attitude: the vehicle's at capture; needed for points.
+            attitude: the vehicle's when the message is read; needed for points.
         """
-        messages: Sequence[mavlink.MAVLink_message]
-        if attitude is not None and self.sends_points(profile):
-            at_ms = (time_usec // 1000 or captured_ns // 1_000_000) % 2**32
-            # A stamp that was used before would join two pictures into one.
-            self._points_ms = at_ms if at_ms != self._points_ms else at_ms + 1
-            messages = encode_obstacle_points(scan, attitude, self._points_ms, self._most_points)
-        else:
-            messages = [encode_obstacle_distance(scan, time_usec, profile)]
-        self._limits_m = (scan.min_distance_m, scan.max_distance_m)
-        self._gate.passed(captured_ns, now_ns)
-        return messages
+        if attitude is None or not self.sends_points(profile):
+            return [encode_obstacle_distance(scan, time_usec, profile)]
+        at_ms = (time_usec // 1000 or captured_ns // 1_000_000) % 2**32
+        # A stamp that was used before would join two pictures into one.
+        self._points_ms = at_ms if at_ms != self._points_ms else at_ms + 1
+        return encode_obstacle_points(scan, attitude, self._points_ms, self._most_points)
 
 
 def _is_known(attitude: Attitude | None) -> bool:

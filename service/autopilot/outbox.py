@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -16,6 +16,9 @@ _MAX_WAITING = 64
 _FRAME_BYTES, _SIGNATURE_BYTES = 12, 13
 
 Packed = tuple[mavlink.MAVLink_message, bytes]
+
+AtLeaving = Callable[[int], Sequence[mavlink.MAVLink_message]]
+"""Makes a scan's messages for the moment, nanoseconds on the service's clock, in which they leave."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,7 @@ class Outbox:
         self._signed = False
         self._budget = ByteBudget(bytes_per_s)
         self._heartbeat: _Waiting | None = None
-        self._obstacles: _Waiting | None = None
+        self._obstacles: tuple[AtLeaving, int] | None = None
         self._others: deque[_Waiting] = deque()
         self._texts: deque[_Waiting] = deque()
         self.sent_obstacles = 0
@@ -72,19 +75,16 @@ class Outbox:
             queue.popleft()
             self.dropped += 1
 
-    def put_obstacles(self, messages: Sequence[mavlink.MAVLink_message], expires_ns: int) -> None:
+    def put_obstacles(self, at_leaving: AtLeaving, expires_ns: int) -> None:
         """Queue one scan's messages, which leave together, instead of a scan that still waits."""
-        if self._obstacles is not None:
-            self.dropped += len(self._obstacles.messages)
-        self._obstacles = _Waiting(tuple(messages), expires_ns)
+        self.dropped += self._obstacles is not None
+        self._obstacles = (at_leaving, expires_ns)
 
     def take(self, now_ns: int) -> list[Packed]:
         """All messages that may leave now, with their frames."""
         taken: list[Packed] = []
         self._heartbeat = self._take_or_keep(self._heartbeat, now_ns, 0, taken)
-        before = len(taken)
-        self._obstacles = self._take_or_keep(self._obstacles, now_ns, 0, taken)
-        self.sent_obstacles += len(taken) > before
+        self._take_obstacles(now_ns, taken)
         for queue in (self._others, self._texts):
             while queue:
                 if self._take_or_keep(queue[0], now_ns, OBSTACLE_BYTES, taken) is not None:
@@ -94,9 +94,23 @@ class Outbox:
 
     def clear(self) -> None:
         """Drop everything."""
-        self._heartbeat = self._obstacles = None
+        self._heartbeat, self._obstacles = None, None
         self._others.clear()
         self._texts.clear()
+
+    def _take_obstacles(self, now_ns: int, taken: list[Packed]) -> None:
+        if self._obstacles is None:
+            return
+        at_leaving, expires_ns = self._obstacles
+        messages = tuple(at_leaving(now_ns)) if now_ns <= expires_ns else ()
+        if not messages:
+            self.dropped += 1
+            self._obstacles = None
+            return
+        before = len(taken)
+        if self._take_or_keep(_Waiting(messages, expires_ns), now_ns, 0, taken) is None:
+            self._obstacles = None
+            self.sent_obstacles += len(taken) > before
 
     def _take_or_keep(
         self, waiting: _Waiting | None, now_ns: int, keep_bytes: int, taken: list[Packed]

@@ -2,33 +2,35 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Hashable
 from dataclasses import replace
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from service.autopilot.byte_budget import bytes_per_s_of
+from service.autopilot.connection import Connection
 from service.autopilot.framing import is_mavlink1
 from service.autopilot.link_status import LinkStatus
 from service.autopilot.link_watch import LinkWatch
 from service.autopilot.motion_history import MotionLimits
 from service.autopilot.notices import Notice, Notices, Problem
 from service.autopilot.obstacle_gate import Refusal
-from service.autopilot.obstacle_sender import ObstacleSender
+from service.autopilot.obstacle_output import ObstacleOutput
 from service.autopilot.outbox import Outbox
 from service.autopilot.packet_trust import PacketTrust
 from service.autopilot.presence import Presence
 from service.autopilot.profile_choice import ProfileChoice
 from service.autopilot.rate_meter import RateMeter
+from service.autopilot.requests import Requests
+from service.autopilot.scan_delivery import ScanDelivery
 from service.autopilot.service_state import ServiceState
 from service.autopilot.signing import Signing
 from service.autopilot.signing_key import SigningKey
 from service.autopilot.sources import Sources
 from service.autopilot.status_text import StatusTexts
-from service.autopilot.streams import StreamRequests, wanted_streams
 from service.autopilot.telemetry_tracker import TelemetryTracker
-from service.autopilot.timesync import TimeSync
+from service.autopilot.timesync import RoundTrip
+from service.autopilot.transport_delay import TransportDelay
 from service.autopilot.vehicle import Hearing, VehicleLearner
 from service.settings.autopilot import AutopilotSettings
 from service.telemetry import Telemetry
@@ -58,26 +60,29 @@ class LinkSession:
         self._learner = VehicleLearner(settings.system_id, self._timeout_ns)
         self._sources = Sources()
         self._tracker = TelemetryTracker(MotionLimits.of(settings))
-        self._streams = StreamRequests(wanted_streams(settings))
-        self._timesync = TimeSync(round(1e9 / settings.timesync_rate_hz))
         self._presence = Presence()
         self._texts = StatusTexts()
         self._choice = ProfileChoice(settings.profile)
+        self._requests = Requests(settings, self._choice)
         self._bytes_per_s = bytes_per_s_of(settings.bytes_per_s, settings.endpoint)
-        self._sender = ObstacleSender(settings, self._bytes_per_s)
         self._outbox = Outbox(self._bytes_per_s)
         self._outbox.set_system_id(settings.system_id or 1)
+        self._transport = TransportDelay(settings.endpoint)
+        self._obstacles = ObstacleOutput(
+            settings,
+            self._bytes_per_s,
+            self._tracker,
+            ScanDelivery(self._tracker, self._transport),
+            self._choice,
+            self._outbox,
+        )
         self._notices = Notices()
         self._watch = LinkWatch(self._notices, settings.endpoint)
+        self._connection = Connection(settings.endpoint, self._timeout_ns, self._notices, self._watch)
         self._trust = PacketTrust(self._notices)
         if key is not None:
             self.sign_with(key)
-        self._line_open = False
-        self._opened_ns = 0
-        self._heard_ns: int | None = None
-        self._line_losses = 0
-        self._refused: Counter[str] = Counter()
-        self._obstacle_meter, self._in_meter, self._out_meter = RateMeter(), RateMeter(), RateMeter()
+        self._in_meter, self._out_meter = RateMeter(), RateMeter()
 
     def sign_with(self, key: SigningKey) -> None:
         """Sign what leaves from now on, and believe only what is signed with this key."""
@@ -88,24 +93,17 @@ class LinkSession:
 
     def line_opened(self, now_ns: int) -> None:
         """The socket or port is open: say hello at the next `tick`."""
-        self._line_open, self._opened_ns = True, now_ns
+        self._connection.opened(now_ns)
         self._sources.clear()
         self._outbox.clear()
         self._presence.restart()
-        self._ask_again()
-        if self._notices.over(Problem.LINE):
-            self._notices.news(f"autopilot line {self._settings.endpoint} is open")
-        if self._sender.complaint is not None:
-            self._notices.problem(Problem.SLOW_LINE, self._sender.complaint)
+        self._requests.restart()
+        if self._obstacles.complaint is not None:
+            self._notices.problem(Problem.SLOW_LINE, self._obstacles.complaint)
 
     def line_failed(self, reason: str) -> None:
         """The socket or port could not be opened, or was lost; it is being tried again."""
-        if self._line_open:
-            self._line_losses += 1
-        self._line_open = False
-        self._notices.problem(
-            Problem.LINE, f"autopilot line {self._settings.endpoint}: {reason}; trying again"
-        )
+        self._connection.failed(reason)
 
     @property
     def destination(self) -> Hashable:
@@ -128,15 +126,14 @@ class LinkSession:
 
     def _on_message(self, message: mavlink.MAVLink_message, arrival_ns: int, source: Hashable) -> None:
         name = message.get_type()
-        if not self._trust.believes(message, self._is_connected(arrival_ns)):
+        if not self._trust.believes(message, self._connection.is_up(arrival_ns)):
             return
         if name == "HEARTBEAT":
             self._on_heartbeat(message, arrival_ns, source)
         if not self._learner.is_from_vehicle(message, source):
             return
-        if not self._is_connected(arrival_ns):
-            self._on_vehicle_back(arrival_ns)
-        self._heard_ns = arrival_ns
+        if self._connection.heard(arrival_ns):
+            self._requests.restart()
         self._trust.on_vehicle(message)
         self._watch.protocol(is_mavlink1(message))
         reboots, steps = self._tracker.reboots, self._tracker.clock.steps
@@ -150,12 +147,12 @@ class LinkSession:
             self._on_timesync(message, arrival_ns)
         elif name == "AUTOPILOT_VERSION" and self._choice.on_version(message):
             self._tell_profile()
-        self._streams.on_message(name, arrival_ns)
+        self._requests.on_message(name, arrival_ns)
         if self._tracker.reboots != reboots:
-            self._ask_again()
+            self._requests.restart()
             self._notices.news("the autopilot has rebooted: asking for its messages again")
         elif self._tracker.clock.steps != steps:
-            self._timesync.restart()
+            self._requests.restart_time()
             self._notices.news("a clock has stepped: the autopilot's time is taken anew")
 
     def _on_heartbeat(
@@ -169,60 +166,42 @@ class LinkSession:
         if hearing is Hearing.LEARNT and vehicle is not None:
             if before is not None:
                 self._tracker.forget()
-            self._heard_ns = None
+            self._connection.new_vehicle()
             self._outbox.set_system_id(vehicle.system_id)
             self._choice.on_vehicle(vehicle.autopilot)
             self._notices.news(f"autopilot heard: {vehicle.autopilot}, system {vehicle.system_id}")
             self._tell_profile()
 
-    def _on_vehicle_back(self, arrival_ns: int) -> None:
-        """The first word of the vehicle, or the first after a silence."""
-        self._ask_again()
-        if self._heard_ns is not None:
-            self._notices.news(f"autopilot is back after {(arrival_ns - self._heard_ns) / 1e9:.1f} s")
-
-    def _ask_again(self) -> None:
-        self._streams.restart()
-        self._timesync.restart()
-        self._choice.restart()
-
     def _tell_profile(self) -> None:
-        points = " as OBSTACLE_DISTANCE_3D" if self._sender.sends_points(self._choice.profile) else ""
+        points = " as OBSTACLE_DISTANCE_3D" if self._obstacles.sends_points() else ""
         self._notices.news(f"obstacles go out in the {self._choice}{points}")
 
     def _on_timesync(self, message: mavlink.MAVLink_timesync_message, arrival_ns: int) -> None:
-        answer = self._timesync.answer(message, arrival_ns)
-        if answer is not None:
-            self._outbox.put(answer, arrival_ns + _SHORT_LIVED_NS)
-            return
-        trip = self._timesync.round_trip(message, arrival_ns)
-        if trip is not None:
-            self._tracker.on_round_trip(trip)
+        told = self._requests.on_timesync(message, arrival_ns)
+        if isinstance(told, RoundTrip):
+            self._tracker.on_round_trip(told)
+            self._transport.on_round_trip(told.sent_ns, told.received_ns)
+        elif told is not None:
+            self._outbox.put(told, arrival_ns + _SHORT_LIVED_NS)
 
     # -- bytes out
 
     def tick(self, now_ns: int) -> None:
         """Queue whatever is due; call it at least ten times a second."""
-        if not self._line_open:
+        if not self._connection.is_open:
             return
         heartbeat = self._presence.heartbeat(now_ns)
         if heartbeat is not None:
             self._outbox.put(heartbeat, now_ns + _SHORT_LIVED_NS)
-        self._watch_connection(now_ns)
         vehicle = self._learner.vehicle
-        if vehicle is None or not self._is_connected(now_ns):
+        self._connection.check(now_ns, was_known=vehicle is not None)
+        if vehicle is None or not self._connection.is_up(now_ns):
             return
-        for stream in self._streams.due(now_ns):
-            self._outbox.put(stream.request(vehicle.system_id), now_ns + _SHORT_LIVED_NS)
-        request = self._timesync.request(now_ns)
-        if request is not None:
+        for request in self._requests.due(vehicle.system_id, now_ns):
             self._outbox.put(request, now_ns + _SHORT_LIVED_NS)
-        question = self._choice.request(vehicle.system_id, now_ns)
-        if question is not None:
-            self._outbox.put(question, now_ns + _SHORT_LIVED_NS)
         for text in self._texts.due(now_ns):
             self._outbox.put(text, now_ns + _TEXT_LIVES_NS)
-        self._watch.streams(self._streams.refused())
+        self._watch.streams(self._requests.refused())
 
     def take_output(self, now_ns: int) -> list[bytes]:
         """Frames to write now, in order."""
@@ -230,32 +209,21 @@ class LinkSession:
         frames = [frame for _, frame in self._outbox.take(now_ns)]
         if frames:
             self._out_meter.add(now_ns, sum(map(len, frames)))
-            self._obstacle_meter.add(now_ns, self._outbox.sent_obstacles - sent_before)
+            self._obstacles.left(self._outbox.sent_obstacles - sent_before, now_ns)
         return frames
 
     def send_obstacles(
         self, scan: ObstacleScan, captured_ns: int, now_ns: int, congested: bool = False
     ) -> bool:
-        """Queue the obstacles of the frame captured at `captured_ns`, if it may be sent.
+        """Queue the scan of the frame captured at `captured_ns`, if it may be sent.
 
-        Each frame is sent at most once, while it is fresh, at the rate that the line carries. `congested`
-        tells that the line has not taken the earlier bytes yet.
+        It is taken as of its capture; when it leaves it is turned and shortened by the motion since then.
+        `congested` tells that the line has not taken the earlier bytes yet.
         """
-        profile = self._choice.profile
-        attitude = self._tracker.telemetry_at(captured_ns).attitude
-        if not self._is_connected(now_ns):
-            refusal: Refusal | None = Refusal.NOT_CONNECTED
-        elif congested:
-            refusal = Refusal.CONGESTED
-        else:
-            refusal = self._sender.refusal(scan, captured_ns, now_ns, profile, attitude)
-        if refusal is not None:
-            self._refused[refusal.value] += 1
-            return False
-        time_usec = self._tracker.autopilot_us(captured_ns, now_ns)
-        messages = self._sender.messages(scan, captured_ns, now_ns, time_usec, profile, attitude)
-        self._outbox.put_obstacles(messages, captured_ns + round(self._settings.max_frame_age_s * 1e9))
-        return True
+        blocked = Refusal.CONGESTED if congested else None
+        if not self._connection.is_up(now_ns):
+            blocked = Refusal.NOT_CONNECTED
+        return self._obstacles.offer(scan, captured_ns, now_ns, blocked)
 
     def set_state(self, state: ServiceState) -> None:
         """Tell this state in HEARTBEAT from now on."""
@@ -294,28 +262,31 @@ class LinkSession:
         vehicle, clock = self._learner.vehicle, self._tracker.clock
         return LinkStatus(
             endpoint=self._settings.endpoint,
-            connected=self._is_connected(now_ns),
-            line_open=self._line_open,
+            connected=self._connection.is_up(now_ns),
+            line_open=self._connection.is_open,
             system_id=vehicle.system_id if vehicle else None,
             autopilot=vehicle.autopilot if vehicle else None,
             mode=vehicle.mode if vehicle else None,
             armed=vehicle.armed if vehicle else None,
             heartbeat_age_s=(now_ns - vehicle.heard_ns) / 1e9 if vehicle else None,
             mavlink1_seen=self._watch.mavlink1,
-            rates_hz=self._streams.rates_hz(now_ns),
+            rates_hz=self._requests.rates_hz(now_ns),
             reboots=self._tracker.reboots,
             clock_steps=clock.steps,
-            line_losses=self._line_losses,
+            line_losses=self._connection.losses,
             clock_synced=clock.is_synced(now_ns),
             clock_offset_s=clock.offset_ns / 1e9 if clock.offset_ns is not None else None,
             clock_width_s=clock.width_ns / 1e9 if clock.width_ns is not None else None,
             sent_obstacles=self._outbox.sent_obstacles,
             profile=self._choice.profile.name if vehicle else None,
-            obstacle_rate_hz=self._obstacle_meter.per_second(now_ns),
-            obstacle_rate_limit_hz=self._sender.rate_hz,
+            obstacle_rate_hz=self._obstacles.rate_hz(now_ns),
+            obstacle_rate_limit_hz=self._obstacles.limit_hz,
+            obstacle_delay_ms=self._obstacles.delay_ms,
+            transport_ms=self._transport.estimate_ns / 1e6,
+            not_made_good=self._obstacles.not_made_good,
             byte_budget_per_s=self._bytes_per_s,
             dropped_messages=self._outbox.dropped,
-            refused_obstacles=dict(self._refused),
+            refused_obstacles=self._obstacles.refused,
             bytes_in_per_s=self._in_meter.per_second(now_ns),
             bytes_out_per_s=self._out_meter.per_second(now_ns),
             bad_bytes=self._sources.bad_bytes,
@@ -324,12 +295,3 @@ class LinkSession:
             other_system_ids=tuple(sorted(self._learner.others)),
             problem=self._notices.standing,
         )
-
-    def _is_connected(self, now_ns: int) -> bool:
-        return self._line_open and self._heard_ns is not None and now_ns - self._heard_ns <= self._timeout_ns
-
-    def _watch_connection(self, now_ns: int) -> None:
-        if self._is_connected(now_ns):
-            self._watch.connected()
-        elif now_ns - max(self._opened_ns, self._heard_ns or 0) > self._timeout_ns:
-            self._watch.silent(was_heard=self._learner.vehicle is not None)

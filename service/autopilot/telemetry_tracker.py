@@ -20,6 +20,10 @@ _QUALITY_INVALID = 1
 _OTHER_SENSOR_NS = 500_000_000
 """With several downward sensors one is kept to until it has been silent for this long."""
 
+_PREDICTED_NS = 250_000_000
+"""Motion is carried on so far for a message that is about to leave: a message of 50 Hz that was 100 ms late,
+and a way of 100 ms."""
+
 _NEWEST_POSE_NS = 500_000_000
 """An attitude older than this is no newest pose any more."""
 
@@ -41,6 +45,10 @@ class TelemetryTracker:
     def reboots(self) -> int:
         """Reboots seen."""
         return self._boot.reboots
+
+    @property
+    def _epoch(self) -> int:
+        return self.reboots + self.clock.steps
 
     def forget(self) -> None:
         """Another autopilot speaks now."""
@@ -85,17 +93,25 @@ class TelemetryTracker:
 
     def telemetry_at(self, at_ns: int) -> Telemetry:
         """Motion at `at_ns` on the service's clock; what no message is near enough to is None."""
+        return self._telemetry(at_ns, None)
+
+    def predicted(self, at_ns: int) -> Telemetry:
+        """Motion at a moment up to 0.25 s after the newest messages, carried on by their rates."""
+        return self._telemetry(at_ns, _PREDICTED_NS)
+
+    def _telemetry(self, at_ns: int, carried_ns: int | None) -> Telemetry:
         offset_ns = self.clock.offset_ns
         if offset_ns is None:
-            return Telemetry(at_ns)
+            return Telemetry(at_ns, epoch=self._epoch)
         boot_ns = at_ns - offset_ns
-        position = self._motion.position_at(boot_ns)
+        position = self._motion.position_at(boot_ns, carried_ns)
         return Telemetry(
             at_ns=at_ns,
-            attitude=self._motion.attitude_at(boot_ns),
+            attitude=self._motion.attitude_at(boot_ns, carried_ns),
             height_m=self._motion.height_at(boot_ns),
             position_ned_m=position[0] if position else None,
             velocity_ned_mps=position[1] if position else None,
+            epoch=self._epoch,
         )
 
     def newest(self, now_ns: int) -> Telemetry:

@@ -138,7 +138,7 @@ class TestOutbox:
         distance = mavlink.MAVLink_obstacle_distance_message(0, 4, [1] * 72, 5, 20, 2000)
         outbox.put(text)
         outbox.put(mavlink.MAVLink_timesync_message(0, 1))
-        outbox.put_obstacles([distance], S)
+        outbox.put_obstacles(lambda _: [distance], S)
         outbox.put(beat)
         kinds = [message.get_type() for message, _ in outbox.take(0)]
         assert kinds == ["HEARTBEAT", "OBSTACLE_DISTANCE", "TIMESYNC", "STATUSTEXT"]
@@ -147,7 +147,8 @@ class TestOutbox:
         outbox = Outbox(2100)
         for number in range(4):
             words = [100 + number] * 72
-            outbox.put_obstacles([mavlink.MAVLink_obstacle_distance_message(0, 4, words, 5, 20, 2000)], S)
+            distance = mavlink.MAVLink_obstacle_distance_message(0, 4, words, 5, 20, 2000)
+            outbox.put_obstacles(lambda _, distance=distance: [distance], S)
             taken = outbox.take(0)
             assert len(taken) == (1 if number < 2 else 0)
         assert outbox.dropped == 1

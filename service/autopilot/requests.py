@@ -1,0 +1,62 @@
+"""What the service asks of the autopilot of its own accord: streams, time, version."""
+
+from __future__ import annotations
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from service.autopilot.profile_choice import ProfileChoice
+from service.autopilot.streams import StreamRequests, WantedStream, wanted_streams
+from service.autopilot.timesync import RoundTrip, TimeSync
+from service.settings.autopilot import AutopilotSettings
+
+
+class Requests:
+    """Decides when each question is asked, and asks again what a reboot or a silence has lost.
+
+    Args:
+        settings: the `[autopilot]` section.
+        choice: asks for the version as long as that decides the layout.
+    """
+
+    def __init__(self, settings: AutopilotSettings, choice: ProfileChoice) -> None:
+        self._streams = StreamRequests(wanted_streams(settings))
+        self._timesync = TimeSync(round(1e9 / settings.timesync_rate_hz))
+        self._choice = choice
+
+    def restart(self) -> None:
+        """Ask for everything again."""
+        self._streams.restart()
+        self._timesync.restart()
+        self._choice.restart()
+
+    def restart_time(self) -> None:
+        """Bind the clocks again: one has stepped."""
+        self._timesync.restart()
+
+    def due(self, system_id: int, now_ns: int) -> list[mavlink.MAVLink_message]:
+        """What to ask the autopilot of `system_id` now."""
+        asked: list[mavlink.MAVLink_message] = [
+            stream.request(system_id) for stream in self._streams.due(now_ns)
+        ]
+        for request in (self._timesync.request(now_ns), self._choice.request(system_id, now_ns)):
+            if request is not None:
+                asked.append(request)
+        return asked
+
+    def on_message(self, name: str, arrival_ns: int) -> None:
+        """Count a message of the autopilot."""
+        self._streams.on_message(name, arrival_ns)
+
+    def on_timesync(
+        self, message: mavlink.MAVLink_timesync_message, arrival_ns: int
+    ) -> mavlink.MAVLink_timesync_message | RoundTrip | None:
+        """Our answer to a request, or what an answer to ours tells; None for answers to others."""
+        return self._timesync.answer(message, arrival_ns) or self._timesync.round_trip(message, arrival_ns)
+
+    def refused(self) -> list[WantedStream]:
+        """Streams that were asked for several times and still do not come."""
+        return self._streams.refused()
+
+    def rates_hz(self, now_ns: int) -> dict[str, float]:
+        """Messages a second by name, over the last two seconds."""
+        return self._streams.rates_hz(now_ns)
