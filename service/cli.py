@@ -41,6 +41,7 @@ class Command:
 COMMANDS = {
     "run": Command("service.run_command", "run", "Fly: camera to depth to OBSTACLE_DISTANCE and Zenoh."),
     "record": Command("service.recorder.command", "record", "Fly, and record the flight."),
+    "recover": Command("service.recorder.recover_command", "recover", "Rescue a record that was cut off."),
     "watch": Command("service.watch.command", "watch", "Show scan and status of vehicles live."),
     "ground": Command("service.ground.command", "ground", "Serve a page that shows every vehicle live."),
     "doctor": Command(
