@@ -19,7 +19,8 @@ class Trouble(Enum):
     NO_ATTITUDE = "no attitude at picture time"
     NO_HEIGHT = "no height above ground"
     NO_GROUND = "no ground seen to scale depth"
-    BAD_SCALE = "scale from ground is uncertain"
+    BAD_SCALE = "metric scale is uncertain"
+    OLD_SCALE = "metric scale is too old"
     NOT_SENT = "autopilot link takes no distances"
     NO_DEPTH = "depth is unknown everywhere"
 

@@ -33,10 +33,13 @@ from uavdepth.errors import (
 )
 from uavdepth.ground_scale import GroundScale, GroundScaler, vertical_height_m
 from uavdepth.hints import GroundHint, Hints, PointHints
+from uavdepth.motion_points import MotionPoints, MotionPointSettings
 from uavdepth.obstacle_message import encode_obstacle_distance, obstacle_words
 from uavdepth.obstacle_scan import ObstacleScan, SectorState
+from uavdepth.scale_estimator import ScaleEstimate, ScaleEstimator
 from uavdepth.scale_tracker import ScaleTracker
 from uavdepth.scanner import ObstacleScanner
+from uavdepth.vehicle_motion import MotionNoise, VehicleMotion
 
 if TYPE_CHECKING:
     from uavdepth.depth_model import DepthModel
@@ -60,14 +63,20 @@ __all__ = [
     "ModelCard",
     "ModelCardError",
     "ModelFileError",
+    "MotionNoise",
+    "MotionPointSettings",
+    "MotionPoints",
     "ObstacleScan",
     "ObstacleScanner",
     "PointHints",
+    "ScaleEstimate",
+    "ScaleEstimator",
     "ScaleTracker",
     "ScanError",
     "SceneError",
     "SectorState",
     "UavDepthError",
+    "VehicleMotion",
     "colorize_depth",
     "decode_depth_png",
     "encode_depth_png",

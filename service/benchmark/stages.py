@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from service.benchmark.pictures import CAMERA, HEIGHT_M, LEVEL, MOUNT
 from service.frame import Frame
-from service.pipeline import METRIC_FACTORS, Perception
+from service.network import answers_in_metres, network_kind
+from service.pipeline import Perception
 from service.settings import Settings
 from service.telemetry import Telemetry
 from uavdepth.depth_codec import encode_depth_png
@@ -23,6 +24,7 @@ from uavdepth.depth_model import DepthModel
 from uavdepth.ground_scale import GroundScaler
 from uavdepth.inference import InferenceSession, open_session
 from uavdepth.obstacle_message import encode_obstacle_distance
+from uavdepth.scale_estimator import METRIC_FACTORS, ScaleEstimator
 from uavdepth.scanner import ObstacleScanner
 
 _WARM_UP = 3
@@ -86,9 +88,10 @@ def measure_stages(model_name: str, pictures: list[NDArray[np.uint8]]) -> StageT
         }
     )
     max_depth_m = float("inf") if loaded.card.max_depth_m is None else loaded.card.max_depth_m
-    perception = Perception(
-        settings, model, None if "ground" in loaded.card.hints else scaler, scanner, max_depth_m
+    estimator = (
+        None if answers_in_metres(loaded.card) else ScaleEstimator(CAMERA, MOUNT, network_kind(loaded.card))
     )
+    perception = Perception(settings, model, estimator, scanner, max_depth_m, loaded.card.hints)
     rows = []
     for number, picture in enumerate(pictures):
         frame = Frame(picture, number, number)

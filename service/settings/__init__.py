@@ -8,8 +8,10 @@ from service.settings.autopilot import AutopilotSettings
 from service.settings.camera import CameraSettings
 from service.settings.log import LogSettings
 from service.settings.model import ModelSettings
+from service.settings.motion import MotionSettings
 from service.settings.mount import MountSettings
 from service.settings.record import RecordSettings
+from service.settings.scale import ScaleSettings
 from service.settings.scan import ScanSettings
 from service.settings.section import Section
 from service.settings.vehicle import VehicleSettings
@@ -20,8 +22,10 @@ __all__ = [
     "CameraSettings",
     "LogSettings",
     "ModelSettings",
+    "MotionSettings",
     "MountSettings",
     "RecordSettings",
+    "ScaleSettings",
     "ScanSettings",
     "Settings",
     "VehicleSettings",
@@ -36,6 +40,8 @@ class Settings(Section):
     vehicle: VehicleSettings = Field(default_factory=VehicleSettings)
     mount: MountSettings = Field(default_factory=MountSettings)
     model: ModelSettings = Field(default_factory=ModelSettings)
+    motion: MotionSettings = Field(default_factory=MotionSettings)
+    scale: ScaleSettings = Field(default_factory=ScaleSettings)
     scan: ScanSettings = Field(default_factory=ScanSettings)
     autopilot: AutopilotSettings = Field(default_factory=AutopilotSettings)
     zenoh: ZenohSettings = Field(default_factory=ZenohSettings)

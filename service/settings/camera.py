@@ -84,6 +84,13 @@ class CameraSettings(Section):
         description="Resize pictures whose size is not width x height but whose aspect is the same. "
         "Otherwise such a camera is refused, because its calibration would be wrong.",
     )
+    mask: str | None = Field(
+        default=None,
+        min_length=1,
+        title="Mask picture",
+        description="Path of a picture of width x height, white where the camera may look and black where it "
+        "sees the vehicle itself (landing legs, propellers): what is black is unknown, never near.",
+    )
     latency_ms: float = Field(
         default=0.0,
         ge=0.0,

@@ -10,7 +10,7 @@ from service.settings.section import Section
 
 
 class ScanSettings(Section):
-    """Which obstacles count, and when depth is trusted."""
+    """Which obstacles count."""
 
     min_distance_m: float = Field(
         default=0.2,
@@ -66,29 +66,6 @@ class ScanSettings(Section):
         title="Memory for obstacles, seconds",
         description="How long an obstacle that has left the picture stays in the scan, carried along with "
         "the vehicle's motion. It needs LOCAL_POSITION_NED. 0 switches it off.",
-    )
-    max_scale_sigma: float = Field(
-        default=0.5,
-        gt=0.0,
-        le=1.0,
-        title="Largest uncertainty of the scale",
-        description="Relative standard deviation of the metric scale above which no distances are sent.",
-    )
-    scale_hold_s: float = Field(
-        default=30.0,
-        ge=0.0,
-        le=120.0,
-        title="Time that a scale is kept, seconds",
-        description="How long the last metric scale holds while the height is known but no ground is seen, "
-        "as close to a wall; its uncertainty grows meanwhile. After it nothing is sent, and ArduPilot takes "
-        "silence for a free path.",
-    )
-    scale_hold_without_height_s: float = Field(
-        default=2.0,
-        ge=0.0,
-        le=30.0,
-        title="Time that a scale is kept without height, seconds",
-        description="The same while the rangefinder gives no height.",
     )
 
     @model_validator(mode="after")

@@ -23,6 +23,7 @@ from service.telemetry import Telemetry
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel
 from uavdepth.depth_map import DepthMap
+from uavdepth.hints import Hints
 from uavdepth.obstacle_scan import ObstacleScan
 
 WIDTH, HEIGHT = 160, 96
@@ -33,7 +34,7 @@ WAIT_S = 20.0
 
 
 def make_settings(*overrides: str) -> Settings:
-    """Small pictures, no Zenoh, the rest at its default."""
+    """Small pictures, no Zenoh, height by the rangefinder alone, the rest at its default."""
     return load_settings(
         None,
         [
@@ -43,6 +44,7 @@ def make_settings(*overrides: str) -> Settings:
             "camera.horizontal_fov_deg=80",
             "camera.reopen_after_s=0.05",
             "zenoh.enabled=false",
+            "scale.height_source=rangefinder",
             *overrides,
         ],
     )
@@ -90,7 +92,9 @@ class FixedDepth:
     error: Exception | None = None
     asked: int = 0
 
-    def infer(self, image_bgr: NDArray[np.uint8], camera: CameraModel) -> DepthMap:
+    def infer(
+        self, image_bgr: NDArray[np.uint8], camera: CameraModel, hints: Hints | None = None
+    ) -> DepthMap:
         self.asked += 1
         if self.error is not None:
             raise self.error
@@ -113,6 +117,7 @@ class FakeLink:
     states: list[ServiceState] = field(default_factory=list)
     said: list[tuple[int, str]] = field(default_factory=list)
     closed: bool = False
+    holds: int = 0
 
     def start(self) -> None:
         return
@@ -134,6 +139,10 @@ class FakeLink:
 
     def say(self, severity: int, text: str) -> None:
         self.said.append((severity, text))
+
+    def hold(self) -> str:
+        self.holds += 1
+        return "BRAKE"
 
     def status(self) -> LinkStatus:
         return LinkStatus(

@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from program_fakes import FLYING_HEIGHT_M, LEVEL, FixedDepth, make_settings, picture, wall_over_ground
 
+from service.errors import ConfigError
 from service.frame import Frame
-from service.pipeline import Perception, unknown_scan
+from service.pipeline import Perception, make_scanner, unknown_scan
 from service.telemetry import Telemetry
 from service.trouble import Trouble
+from uavdepth.attitude import Attitude
+from uavdepth.camera import CameraModel
+from uavdepth.depth_map import DepthMap
 from uavdepth.errors import ImageSizeError
-from uavdepth.ground_scale import GroundScaler
+from uavdepth.hints import Hints
 from uavdepth.obstacle_scan import SectorState
+from uavdepth.scale_estimator import NetworkKind, ScaleEstimator
 from uavdepth.scanner import ObstacleScanner
 
 SETTINGS = make_settings()
@@ -27,10 +34,17 @@ AHEAD = 31
 FLYING = Telemetry(0, LEVEL, FLYING_HEIGHT_M)
 
 
-def perception_of(model: FixedDepth, *overrides: str, model_max_depth_m: float = float("inf")) -> Perception:
+def perception_of(
+    model: FixedDepth,
+    *overrides: str,
+    model_max_depth_m: float = float("inf"),
+    kind: NetworkKind = "relative",
+    sigma_factor: float = 0.0,
+) -> Perception:
+    """The chain with distances as they are, unless `sigma_factor` says otherwise."""
     settings = make_settings(*overrides)
-    scanner = ObstacleScanner(CAMERA, MOUNT)
-    return Perception(settings, model, GroundScaler(CAMERA, MOUNT), scanner, model_max_depth_m)
+    scanner = ObstacleScanner(CAMERA, MOUNT, sigma_factor=sigma_factor)
+    return Perception(settings, model, ScaleEstimator(CAMERA, MOUNT, kind), scanner, model_max_depth_m)
 
 
 def frame_at(seconds: float, index: int = 0) -> Frame:
@@ -63,7 +77,7 @@ def test_the_vehicles_state_is_asked_for_at_the_time_of_capture_after_the_networ
         asked.append((captured_ns, model.asked))
         return replace(FLYING, at_ns=captured_ns)
 
-    assert perception_of(model).step_late(frame_at(3.0), telemetry_at).trusted
+    assert perception_of(model, "motion.points=false").step_late(frame_at(3.0), telemetry_at).trusted
     assert asked == [(3_000_000_000, 1)]
 
 
@@ -88,41 +102,104 @@ def test_doubt_silences_every_element_and_says_why(
     assert np.all(np.isnan(result.scan.distance_m))
 
 
-def test_a_scale_is_held_for_a_while_without_height_and_then_given_up() -> None:
-    perception = perception_of(
-        FixedDepth(shrunk(wall_over_ground(CAMERA, 8.0))), "scan.scale_hold_without_height_s=1.0"
-    )
+def test_a_scale_is_held_for_two_seconds_without_height_then_given_up_and_back_when_it_is_good() -> None:
+    perception = perception_of(FixedDepth(shrunk(wall_over_ground(CAMERA, 8.0))))
     assert perception.step(frame_at(10.0), FLYING).trusted
     blind = replace(FLYING, height_m=None)
-    held = perception.step(frame_at(10.9), blind)
+    held = perception.step(frame_at(11.9), blind)
     assert held.trusted
     assert held.scale is not None
-    assert held.scale.age_s == pytest.approx(0.9)
+    assert held.scale.age_s == pytest.approx(1.9)
     assert held.scan.distance_m[AHEAD] == pytest.approx(8.0, rel=0.05)
-    assert perception.step(frame_at(11.1), blind).trouble is Trouble.NO_HEIGHT
+    late = perception.step(frame_at(12.1), blind)
+    assert late.trouble is Trouble.NO_HEIGHT
+    assert np.all(late.scan.state == SectorState.UNKNOWN)
+    assert perception.step(frame_at(12.2), FLYING).trusted
 
 
-def test_before_a_wall_that_hides_the_ground_the_scale_is_held_long_and_its_doubt_grows() -> None:
+def test_before_a_wall_that_hides_the_ground_the_scale_is_held_as_long_as_configured() -> None:
     model = FixedDepth(shrunk(wall_over_ground(CAMERA, 8.0)))
-    perception = perception_of(model, "scan.scale_hold_s=30.0")
+    perception = perception_of(model, "scale.max_age_s=8.0")
     first = perception.step(frame_at(10.0), FLYING)
     model.depth_m = np.full_like(model.depth_m, 1.0)  # a wall at 4 m fills the picture
-    held = perception.step(frame_at(35.0), FLYING)
+    held = perception.step(frame_at(17.0), FLYING)
     assert held.trusted
     assert held.scan.distance_m[AHEAD] == pytest.approx(4.0, rel=0.05)
     assert first.scale is not None
     assert held.scale is not None
-    assert held.scale.relative_sigma > 2 * first.scale.relative_sigma
-    assert perception.step(frame_at(41.0), FLYING).trouble is Trouble.NO_GROUND
+    assert held.scale.relative_sigma > first.scale.relative_sigma
+    late = perception.step(frame_at(18.1), FLYING)
+    assert late.trouble is Trouble.OLD_SCALE
+    assert np.all(late.scan.state == SectorState.UNKNOWN)
 
 
 def test_an_uncertain_scale_is_not_used() -> None:
     perception = perception_of(
-        FixedDepth(shrunk(wall_over_ground(CAMERA, 8.0))), "scan.max_scale_sigma=0.001"
+        FixedDepth(shrunk(wall_over_ground(CAMERA, 8.0))), "scale.max_relative_sigma=0.01"
     )
     result = perception.step(frame_at(0.0), FLYING)
     assert result.trouble is Trouble.BAD_SCALE
+    assert result.scale is not None
     assert np.all(result.scan.state == SectorState.UNKNOWN)
+
+
+def test_distances_are_shortened_by_what_the_scale_leaves_uncertain() -> None:
+    model = FixedDepth(shrunk(wall_over_ground(CAMERA, 8.0)))
+    result = perception_of(model, sigma_factor=2.0).step(frame_at(0.0), FLYING)
+    assert result.scale is not None
+    shorter = 8.0 * (1 - 2 * result.scale.relative_sigma)
+    assert result.scan.distance_m[AHEAD] == pytest.approx(shorter, rel=0.05)
+
+
+def test_inverse_depth_up_to_scale_and_shift_becomes_metres_too() -> None:
+    inverse = (1.0 / wall_over_ground(CAMERA, 8.0) - 0.02) * np.float32(7.0)
+
+    class Affine(FixedDepth):
+        def infer(
+            self, image_bgr: NDArray[np.uint8], camera: CameraModel, hints: Hints | None = None
+        ) -> DepthMap:
+            return DepthMap.from_affine(self.depth_m)
+
+    perception = perception_of(Affine(inverse.astype(np.float32)), kind="affine")
+    results = [perception.step(frame_at(0.1 * i, i), FLYING) for i in range(10)]
+    last = results[-1]
+    assert last.trouble is None
+    assert last.scan.state[AHEAD] == SectorState.OBSTACLE
+    assert last.scan.distance_m[AHEAD] == pytest.approx(8.0, rel=0.1)
+
+
+def test_what_the_mask_covers_is_unknown_and_not_near(tmp_path: Path) -> None:
+    legs = np.full((CAMERA.height, CAMERA.width), 255, np.uint8)
+    legs[:, : CAMERA.width // 4] = 0
+    cv2.imwrite(str(tmp_path / "legs.png"), legs)
+    settings = make_settings(f"camera.mask={tmp_path / 'legs.png'}")
+    depth_m = shrunk(wall_over_ground(CAMERA, 8.0))
+    depth_m[:, : CAMERA.width // 4] = 0.1
+    estimator = ScaleEstimator(CAMERA, MOUNT)
+    result = Perception(settings, FixedDepth(depth_m), estimator, make_scanner(settings)).step(
+        frame_at(0.0), FLYING
+    )
+    assert result.trusted
+    assert np.nanmin(result.scan.distance_m) > 6.0
+    assert result.scan.state[AHEAD - 7] == SectorState.UNKNOWN
+
+
+def test_a_mask_that_does_not_fit_is_refused_by_its_key(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "small.png"), np.full((10, 10), 255, np.uint8))
+    with pytest.raises(ConfigError, match=r"\[camera\] mask: .*10x10"):
+        make_scanner(make_settings(f"camera.mask={tmp_path / 'small.png'}"))
+
+
+def test_an_obstacle_that_leaves_the_picture_is_remembered_for_half_a_second() -> None:
+    model = FixedDepth(shrunk(wall_over_ground(CAMERA, 8.0)))
+    perception = perception_of(model)
+    here = replace(FLYING, position_ned_m=(0.0, 0.0, -FLYING_HEIGHT_M))
+    turned = replace(here, attitude=Attitude(0.0, 0.0, 1.2))
+    left = AHEAD - round(np.degrees(1.2) / 5)
+    assert perception.step(frame_at(0.0), here).scan.state[AHEAD] == SectorState.OBSTACLE
+    assert perception.step(frame_at(0.4), turned).scan.state[left] == SectorState.OBSTACLE
+    perception.step(frame_at(1.0), here)
+    assert perception.step(frame_at(1.6), turned).scan.state[left] == SectorState.UNKNOWN
 
 
 @pytest.mark.parametrize("error", [RuntimeError("provider broke"), ImageSizeError("160x96"), KeyError("x")])

@@ -7,6 +7,7 @@ import math
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,6 @@ from onnx import TensorProto, helper, numpy_helper
 from program_fakes import FLYING_HEIGHT_M, LEVEL, make_settings, picture, wall_over_ground
 from structlog.testing import capture_logs
 
-from service.errors import ConfigError
 from service.frame import Frame
 from service.pipeline import Perception
 from service.telemetry import Telemetry
@@ -71,7 +71,9 @@ class ScriptedTelemetry:
 
 
 def perception_of(model: HintedDepth, *overrides: str) -> Perception:
-    return Perception(make_settings(*overrides), model, None, ObstacleScanner(CAMERA, MOUNT))
+    """The chain with distances as they are."""
+    scanner = ObstacleScanner(CAMERA, MOUNT, sigma_factor=0.0)
+    return Perception(make_settings("motion.points=false", *overrides), model, None, scanner)
 
 
 def at(at_ns: int, **changes: object) -> Telemetry:
@@ -92,8 +94,11 @@ def test_metres_come_from_the_network_and_the_height_that_it_is_told() -> None:
     assert result.scan.state[AHEAD] == SectorState.OBSTACLE
     assert result.scan.distance_m[AHEAD] == pytest.approx(8.0, rel=0.05)
     assert result.scale is not None
-    assert (result.scale.factor, result.scale.age_s) == (1.0, 0.0)
-    assert result.scale.relative_sigma == pytest.approx(0.1)
+    assert (result.scale.factor, result.scale.age_s, result.scale.sources) == (1.0, 0.0, ("ground",))
+    assert result.scale.relative_sigma == pytest.approx(0.05)
+    assert result.depth is not None
+    assert result.depth.relative_sigma is not None
+    assert result.depth.relative_sigma[0, 0] == pytest.approx(math.hypot(0.1, 0.05))
 
 
 def test_the_state_is_asked_for_before_the_network_runs_and_again_after_it() -> None:
@@ -103,7 +108,7 @@ def test_the_state_is_asked_for_before_the_network_runs_and_again_after_it() -> 
         model, lambda at_ns: at(at_ns, attitude=early), lambda at_ns: at(at_ns, attitude=late)
     )
     result = perception_of(model).step_late(frame_at(3.0), telemetry)
-    assert telemetry.asked == [(3 * SECOND, 0), (3 * SECOND, 1)]
+    assert set(telemetry.asked) == {(3 * SECOND, 0), (3 * SECOND, 1)}
     assert model.told[0] is not None
     assert model.told[0].ground is not None
     assert model.told[0].ground.attitude == early
@@ -111,34 +116,66 @@ def test_the_state_is_asked_for_before_the_network_runs_and_again_after_it() -> 
     assert result.trusted
 
 
-def test_an_attitude_that_has_not_arrived_yet_is_taken_from_a_little_earlier() -> None:
+def test_an_attitude_that_has_not_arrived_yet_is_carried_on_by_the_turn_so_far() -> None:
     model = HintedDepth()
     arrived_ns = 3 * SECOND - 80 * MS
+
+    def turning(at_ns: int) -> Attitude:
+        return Attitude(0.0, (at_ns - 3 * SECOND) / SECOND, 0.0)
+
     telemetry = ScriptedTelemetry(
-        model, lambda at_ns: at(at_ns, attitude=LEVEL if at_ns <= arrived_ns else None), at
+        model,
+        lambda at_ns: at(at_ns, attitude=turning(at_ns) if at_ns <= arrived_ns else None),
+        lambda at_ns: at(at_ns, attitude=turning(at_ns)),
     )
     result = perception_of(model).step_late(frame_at(3.0), telemetry)
     assert result.trusted
-    assert telemetry.asked[-2] == (3 * SECOND - 100 * MS, 0)
+    assert len(model.told) == 1
+    assert model.told[0] is not None
+    assert model.told[0].ground is not None
+    # Held instead of carried on it would be 0.1 rad, 5.7 degrees, off.
+    assert model.told[0].ground.attitude.pitch_rad == pytest.approx(0.0, abs=1e-3)
 
 
 @pytest.mark.parametrize(
-    ("late", "is_trusted"),
+    ("late", "asked"),
     [
-        (Attitude(0.0, math.radians(2.5), 0.0), True),
-        (Attitude(0.0, math.radians(3.5), 0.0), False),
-        (Attitude(math.radians(-3.5), 0.0, 0.0), False),
-        (Attitude(0.0, 0.0, 2.0), True),
+        (Attitude(0.0, math.radians(2.5), 0.0), 1),
+        (Attitude(0.0, math.radians(3.5), 0.0), 2),
+        (Attitude(math.radians(-3.5), 0.0, 0.0), 2),
+        (Attitude(0.0, 0.0, 2.0), 1),
     ],
 )
-def test_an_answer_to_an_attitude_that_was_not_so_is_not_believed(late: Attitude, is_trusted: bool) -> None:
+def test_an_answer_to_an_attitude_that_was_not_so_is_asked_for_again(late: Attitude, asked: int) -> None:
     model = HintedDepth()
     telemetry = ScriptedTelemetry(model, at, lambda at_ns: at(at_ns, attitude=late))
     result = perception_of(model).step_late(frame_at(3.0), telemetry)
-    assert result.trusted is is_trusted
-    if not is_trusted:
-        assert result.trouble is Trouble.NO_ATTITUDE
-        assert np.all(result.scan.state == SectorState.UNKNOWN)
+    assert result.trusted
+    assert len(model.told) == asked
+    if asked == 2:
+        assert model.told[1] is not None
+        assert model.told[1].ground is not None
+        assert model.told[1].ground.attitude == late
+
+
+def test_a_small_error_of_the_told_attitude_is_uncertainty() -> None:
+    sigmas = []
+    for degrees in (0.0, 2.5):
+        model, late = HintedDepth(), Attitude(0.0, math.radians(degrees), 0.0)
+        telemetry = ScriptedTelemetry(model, at, partial(at, attitude=late))
+        result = perception_of(model).step_late(frame_at(3.0), telemetry)
+        assert result.scale is not None
+        sigmas.append(result.scale.relative_sigma)
+    # 2.5 degrees on ground that is seen 15 degrees below the horizon.
+    assert sigmas[1] == pytest.approx(math.hypot(sigmas[0], math.radians(2.5) / math.tan(math.radians(15))))
+
+
+def test_an_attitude_that_comes_only_while_the_network_runs_is_used() -> None:
+    model = HintedDepth()
+    telemetry = ScriptedTelemetry(model, lambda at_ns: at(at_ns, attitude=None), at)
+    result = perception_of(model).step_late(frame_at(3.0), telemetry)
+    assert result.trusted
+    assert [hints is not None and hints.ground is not None for hints in model.told] == [False, True]
 
 
 @pytest.mark.parametrize(
@@ -154,7 +191,8 @@ def test_without_attitude_or_height_the_network_runs_unhinted_and_nothing_is_bel
     changes: dict[str, object], trouble: Trouble
 ) -> None:
     model = HintedDepth()
-    result = perception_of(model).step(frame_at(1.0), at(SECOND, **changes))
+    perception = perception_of(model)
+    result = perception.step(frame_at(1.0), at(SECOND, **changes))
     assert result.trouble is trouble
     assert np.all(result.scan.state == SectorState.UNKNOWN)
     assert result.depth is None
@@ -163,7 +201,7 @@ def test_without_attitude_or_height_the_network_runs_unhinted_and_nothing_is_bel
 
 def test_a_height_is_held_for_a_while_moved_by_the_climb_and_then_given_up() -> None:
     model = HintedDepth()
-    perception = perception_of(model, "scan.scale_hold_without_height_s=1.0")
+    perception = perception_of(model, "scale.max_age_s=1.0")
     assert perception.step(frame_at(10.0), at(10 * SECOND)).trusted
     blind_ns = 10 * SECOND + 900 * MS
     climbed = at(blind_ns, height_m=None, position_ned_m=(0.0, 0.0, -FLYING_HEIGHT_M - 0.5))
@@ -174,7 +212,7 @@ def test_a_height_is_held_for_a_while_moved_by_the_climb_and_then_given_up() -> 
     assert model.told[1].ground.height_m == pytest.approx(FLYING_HEIGHT_M + 0.5)
     assert held.scale is not None
     assert held.scale.age_s == pytest.approx(0.9)
-    assert held.scale.relative_sigma > 0.1
+    assert held.scale.relative_sigma > 0.05
     late_ns = 11 * SECOND + 100 * MS
     assert perception.step(frame_at(11.1), at(late_ns, height_m=None)).trouble is Trouble.NO_HEIGHT
 
@@ -186,12 +224,8 @@ def test_a_height_of_the_future_is_not_held_when_time_steps_back() -> None:
 
 
 def test_pixels_decide_for_themselves_what_is_unknown() -> None:
-    # Doubt that would silence a scale from the ground leaves the sure pixels standing here.
-    model = HintedDepth(sigma=0.4)
-    result = perception_of(model, "scan.max_scale_sigma=0.2").step(frame_at(1.0), at(SECOND))
-    assert result.trusted
-    assert result.scale is not None
-    assert result.scale.relative_sigma == pytest.approx(0.4)
+    # Doubt that would silence a scale as a whole leaves the sure pixels standing here.
+    assert perception_of(HintedDepth(sigma=0.4)).step(frame_at(1.0), at(SECOND)).trusted
     doubtful = perception_of(HintedDepth(sigma=0.6)).step(frame_at(1.0), at(SECOND))
     assert doubtful.trouble is Trouble.NO_DEPTH
     assert np.all(doubtful.scan.state == SectorState.UNKNOWN)
@@ -263,19 +297,6 @@ def test_a_configured_network_with_hints_measures_in_metres(tmp_path: Path) -> N
     assert result.depth.depth_m[row, 0] == pytest.approx(FLYING_HEIGHT_M / down, rel=0.05)
     assert result.depth.depth_m[0, 0] == pytest.approx(30.0, rel=1e-3)
     assert result.scan.state[AHEAD] == SectorState.CLEAR
-
-
-def test_a_network_without_scale_and_shift_is_refused_by_its_name(tmp_path: Path) -> None:
-    path = Path(__file__).parents[1] / "data" / "depth_anything_tiny.onnx"
-    card = tmp_path / "card.toml"
-    card.write_text(
-        'card_version = 2\nname = "anything"\ninput_width = 70\ninput_height = 42\nmultiple_of = 14\n'
-        'mean = [0, 0, 0]\nstd = [1, 1, 1]\noutput = "affine_inverse_depth"\n'
-        'input_name = "pixel_values"\noutput_name = "predicted_depth"\n'
-    )
-    settings = make_settings(f"model.path={path}", f"model.card={card}", "model.provider=cpu")
-    with pytest.raises(ConfigError, match="anything tells inverse depth up to an unknown scale and shift"):
-        Perception.load(settings)
 
 
 def test_the_log_says_what_runs_the_network_and_once_why_not_something_faster(

@@ -38,8 +38,8 @@ from service.settings import Settings
 from service.trouble import Trouble
 from uavdepth.camera import CameraModel
 from uavdepth.depth_map import DepthMap
-from uavdepth.ground_scale import GroundScaler
 from uavdepth.obstacle_scan import SectorState
+from uavdepth.scale_estimator import ScaleEstimator
 from uavdepth.scanner import ObstacleScanner
 
 SETTINGS = make_settings()
@@ -57,7 +57,8 @@ def network(scale: float = 0.25) -> FixedDepth:
 def loader(model: Any) -> Callable[[Settings], Perception]:
     def load(settings: Settings) -> Perception:
         camera, mount = settings.camera.model, settings.mount.mount
-        return Perception(settings, model, GroundScaler(camera, mount), ObstacleScanner(camera, mount))
+        scanner = ObstacleScanner(camera, mount, sigma_factor=0.0)
+        return Perception(settings, model, ScaleEstimator(camera, mount), scanner)
 
     return load
 
@@ -156,7 +157,7 @@ def test_in_the_air_or_without_rangefinder_a_lack_of_height_is_silence(link_valu
 
 
 def test_losing_the_height_in_the_air_is_critical_and_its_return_is_told() -> None:
-    settings = make_settings("scan.scale_hold_without_height_s=0")
+    settings = make_settings("scale.max_age_s=0")
     with running(settings=settings) as run:
         wait_until(lambda: run.link.states[-1:] == [ServiceState.ACTIVE])
         run.link.height_m = None
