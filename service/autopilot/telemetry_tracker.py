@@ -58,6 +58,16 @@ class TelemetryTracker:
         self._motion.clear()
         self._sensor = None
 
+    def on_message(self, message: mavlink.MAVLink_message, arrival_ns: int) -> None:
+        """Take a message of any kind."""
+        name = message.get_type()
+        if name == "ATTITUDE":
+            self.on_attitude(message, arrival_ns)
+        elif name == "LOCAL_POSITION_NED":
+            self.on_position(message, arrival_ns)
+        elif name == "DISTANCE_SENSOR":
+            self.on_range(message)
+
     def on_attitude(self, message: mavlink.MAVLink_attitude_message, arrival_ns: int) -> None:
         """Take an ATTITUDE; its rates are the body's, as both autopilots send them."""
         boot_ns = self._stamp(message.time_boot_ms, arrival_ns)
