@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from service.errors import RecordError
-from service.pipeline import PerceptionResult
+from service.perception_result import PerceptionResult
 from service.scale_status import ScaleStatus
 from service.telemetry import Telemetry
 from uavdepth.attitude import Attitude

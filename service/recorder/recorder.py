@@ -13,7 +13,7 @@ import structlog
 
 from service.clock import Clock
 from service.errors import RecordError
-from service.pipeline import PerceptionResult
+from service.perception_result import PerceptionResult
 from service.publisher.rate_limit import RateLimit
 from service.recorder import messages
 from service.recorder.byte_queue import ByteQueue
@@ -192,9 +192,9 @@ class Recorder:
     def _run(self) -> None:
         while not self._queue.finished:
             item = self._queue.take(_TAKE_S)
+            written = False
             try:
-                if item is not None:
-                    self._write(item)
+                written = item is not None and self._write(item)
                 self._flush_if_due()
             except (RecordError, OSError) as error:
                 self._fail(str(error))
@@ -202,22 +202,24 @@ class Recorder:
                 # Whatever breaks here, the flight goes on and so does the next file.
                 log.exception("recorder broke")
                 self._fail(f"{type(error).__name__}: {error}")
+            if isinstance(item, _Picture) and not written:
+                self._drop_picture()
+            elif isinstance(item, _Packets) and not written:
+                self._drop_packets()
         self._close()
 
-    def _write(self, item: _Picture | _Packets | _Status) -> None:
+    def _write(self, item: _Picture | _Packets | _Status) -> bool:
+        """Write an item; False if there is no file for it now."""
         writer = self._open_if_due()
         if writer is None:
-            if isinstance(item, _Picture):
-                self._drop_picture()
-            elif isinstance(item, _Packets):
-                self._drop_packets()
-            return
+            return False
         if isinstance(item, _Picture):
             self._write_picture(writer, item)
         elif isinstance(item, _Packets):
             self._write_packets(writer, item)
         else:
             writer.status(item.text, item.at_ns)
+        return True
 
     def _write_picture(self, writer: RecordWriter, item: _Picture) -> None:
         result = item.result
@@ -257,8 +259,8 @@ class Recorder:
         now_ns = self._clock.now_ns()
         if now_ns < self._retry_due_ns or self._take is None:
             return None
-        self._part += 1
         self._shelf.make_room(self._take, self._part)
+        self._part += 1
         header = RecordHeader(
             vehicle=self._settings.vehicle.name,
             version=version("uavdepth"),

@@ -1,0 +1,1 @@
+"""Replay: recorded flights measured again by the same pipeline, on the record's clock."""
