@@ -10,7 +10,7 @@ from service.trouble import Trouble
 
 STALL_NS = 400_000_000
 """After so long without a message obstacles are off: ArduPilot's sensor is unhealthy after 0.5 s, PX4
-stops accelerating after 0.53 s (measured), and the pilot should read why no later than that."""
+stops accelerating after 0.53 s (measured), and the pilot reads why by then."""
 
 FIRST_FRAME_NS = 10_000_000_000
 """Longest start of a camera, a rendered scene included, that is not yet called trouble."""
@@ -99,8 +99,11 @@ class Announcement:
 class Announcer:
     """Turns changes of trouble into texts: each once, and not while it flickers.
 
+    The loss of what protected the vehicle is told at once: silence has lasted by then, and ArduPilot opens
+    the way soon.
+
     Args:
-        settle_ns: how long a new trouble, or its end, must last before it is announced.
+        settle_ns: how long another trouble, or its end, must last before it is announced.
     """
 
     def __init__(self, settle_ns: int = 300_000_000) -> None:
@@ -113,7 +116,9 @@ class Announcer:
         """What to say now, if anything."""
         if trouble is not self._seen:
             self._seen, self._seen_since_ns = trouble, now_ns
-        if trouble is self._said or now_ns - self._seen_since_ns < self._settle_ns:
+        is_loss = self._said is None and state is ServiceState.CRITICAL
+        settle_ns = 0 if is_loss else self._settle_ns
+        if trouble is self._said or now_ns - self._seen_since_ns < settle_ns:
             return None
         self._said = trouble
         if trouble is None:

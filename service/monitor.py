@@ -4,35 +4,25 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Protocol
 
 import structlog
 
+from service.autopilot.hold_request import HoldOutcome
 from service.autopilot.link_status import LinkStatus
 from service.autopilot.service_state import ServiceState
 from service.cameras.reader import CameraReader
 from service.clock import Clock
-from service.health import Announcer, Vitals, state_of, trouble_of
+from service.health import SEVERITY_CRITICAL, Announcer, Vitals, state_of, trouble_of
+from service.hold_on_loss import HoldOnLoss, Moment
+from service.link import Link
 from service.progress import Progress
+from service.status import speed_mps
 from service.trouble import Trouble
 
 log = structlog.get_logger()
 
 _PERIOD_S = 0.05
 _JOIN_TIMEOUT_S = 2.0
-
-
-class PilotsEar(Protocol):
-    """The part of the autopilot link that the monitor speaks to."""
-
-    def set_state(self, state: ServiceState) -> None:
-        """Tell the state in HEARTBEAT."""
-
-    def say(self, severity: int, text: str) -> None:
-        """Send a STATUSTEXT."""
-
-    def status(self) -> LinkStatus:
-        """How the link is doing."""
 
 
 class Monitor:
@@ -46,17 +36,19 @@ class Monitor:
         started_ns: when the service started.
         publish: hands the status to the ground station; None if nobody listens.
         publish_period_ns: how often.
+        on_loss: asks the vehicle to hold when perception is lost; None where only the pilot is told.
     """
 
     def __init__(
         self,
         clock: Clock,
-        link: PilotsEar,
+        link: Link,
         reader: CameraReader,
         progress: Progress,
         started_ns: int,
         publish: Callable[[], None] | None,
         publish_period_ns: int,
+        on_loss: HoldOnLoss | None = None,
     ) -> None:
         self._clock = clock
         self._link = link
@@ -65,6 +57,8 @@ class Monitor:
         self._started_ns = started_ns
         self._publish = publish
         self._publish_period_ns = publish_period_ns
+        self._on_loss = on_loss
+        self._hold_told: HoldOutcome | None = None
         self._publish_due_ns = started_ns
         self._announcer = Announcer()
         self._was_armed: bool | None = None
@@ -115,6 +109,8 @@ class Monitor:
         self.trouble = trouble_of(vitals)
         self.state = state_of(self.trouble, vitals)
         self._link.set_state(self.state)
+        if self._on_loss is not None:
+            self._hold_on_loss(self._on_loss, vitals, link)
         words = self._announcer.hear(self.trouble, self.state, vitals.now_ns)
         if words is None:
             return
@@ -122,6 +118,29 @@ class Monitor:
         reasons = (camera.detail, link.problem, None if result is None else result.detail)
         known = [reason for reason in reasons if reason]
         log.info(words.text, state=self.state.name, **({"because": "; ".join(known)} if known else {}))
+
+    def _hold_on_loss(self, on_loss: HoldOnLoss, vitals: Vitals, link: LinkStatus) -> None:
+        moment = Moment(
+            vitals.now_ns,
+            self.trouble,
+            vitals.sent_ns,
+            vitals.protected,
+            link.armed,
+            link.autopilot,
+            link.mode,
+            speed_mps(self._link.newest_pose()),
+        )
+        if on_loss.hear(moment):
+            mode = self._link.hold()
+            text = f"uavdepth: asks for {mode}" if mode else "uavdepth: knows no mode that stops this vehicle"
+            self._link.say(SEVERITY_CRITICAL, text)
+            log.warning("asks the vehicle to hold", mode=mode, because=self.trouble, flown_in=moment.mode)
+        if link.hold is not self._hold_told:
+            self._hold_told = link.hold
+            if link.hold in (HoldOutcome.REFUSED, HoldOutcome.UNANSWERED):
+                self._link.say(SEVERITY_CRITICAL, f"uavdepth: hold {link.hold.value}, fly by hand")
+            if link.hold is not None:
+                log.info("request to hold", outcome=link.hold.value)
 
     def _note_arming(self, armed: bool | None) -> int | None:
         """When the vehicle was armed last; `armed` is what it is now."""

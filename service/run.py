@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Protocol
 
 import cv2
 import structlog
 
 from service.autopilot.link import AutopilotLink
-from service.autopilot.link_status import LinkStatus
 from service.autopilot.service_state import ServiceState
 from service.cameras.camera import Camera
 from service.cameras.reader import CameraReader, CameraState
@@ -18,19 +16,20 @@ from service.cameras.source import make_camera
 from service.clock import Clock, MonotonicClock
 from service.frame import Frame
 from service.health import SEVERITY_WARNING
+from service.hold_on_loss import HoldOnLoss
+from service.latency_advice import advise
 from service.latest_slot import LatestSlot
+from service.link import Link
 from service.monitor import Monitor
 from service.pipeline import Perception, PerceptionResult
 from service.progress import Progress
 from service.publisher.publisher import ZenohPublisher
 from service.recorder.recorder import Recorder
 from service.settings import Settings
-from service.status import Drops, ServiceStatus, resident_memory_mib
+from service.status import Drops, Latency, ServiceStatus, altitude_m, resident_memory_mib, speed_mps
 from service.status_sample import status_sample
-from service.telemetry import Telemetry
 from service.trouble import Trouble
 from uavdepth.errors import UavDepthError
-from uavdepth.obstacle_scan import ObstacleScan
 
 log = structlog.get_logger()
 
@@ -40,24 +39,13 @@ _LAST_WORDS_S = 0.1
 """Several turns of the link's thread: time for the last STATUSTEXT to leave."""
 
 
-class Link(Protocol):
-    """What the service needs of the autopilot link; every method returns at once."""
-
-    def start(self) -> None: ...
-    def telemetry_at(self, captured_ns: int) -> Telemetry: ...
-    def newest_pose(self) -> Telemetry: ...
-    def send_obstacles(self, scan: ObstacleScan, captured_ns: int) -> bool: ...
-    def set_state(self, state: ServiceState) -> None: ...
-    def say(self, severity: int, text: str) -> None: ...
-    def status(self) -> LinkStatus: ...
-    def close(self) -> None: ...
-
-
 class Service:
     """The program that flies; `start` and `stop` make it embeddable.
 
     Camera, perception, autopilot link and Zenoh each have a thread; between them are latest-only slots.
-    A monitor judges what they do twenty times a second and tells the pilot.
+    A monitor judges what they do twenty times a second and tells the pilot. Subscribers, ground and record
+    get each scan as of its picture's capture, with that stamp; the autopilot gets it turned and shortened by
+    the motion up to the moment in which it reads the message.
 
     Args:
         settings: the configuration.
@@ -117,6 +105,7 @@ class Service:
             self._started_ns,
             self._tell_status if told else None,
             round(1e9 / settings.zenoh.status_rate_hz),
+            HoldOnLoss() if settings.autopilot.on_loss == "hold" else None,
         )
 
     def start(self) -> None:
@@ -204,7 +193,10 @@ class Service:
         link = self._link.status()
         progress, publisher = self._progress, self._publisher
         record = None if self._recorder is None else self._recorder.status()
-        result = progress.result
+        result, pose = progress.result, self._link.newest_pose()
+        # The link tells when messages left; one that does not, when scans were taken.
+        latency = progress.latency if link.obstacle_delay_ms is None else Latency(*link.obstacle_delay_ms)
+        advice = None if latency is None else advise(latency.p95_ms, self._settings.scan.max_distance_m)
         return ServiceStatus(
             vehicle=self._settings.vehicle.name,
             uptime_s=(now_ns - self._started_ns) / 1e9,
@@ -215,7 +207,7 @@ class Service:
             step_ms=progress.step_ms,
             obstacle_messages=progress.messages,
             obstacle_rate_hz=link.obstacle_rate_hz,
-            latency=progress.latency,
+            latency=latency,
             drops=Drops(self._frames.dropped_count, 0 if publisher is None else publisher.dropped_count),
             model_failures=0 if self._perception is None else self._perception.model_failures,
             scale=None if result is None else result.scale,
@@ -226,6 +218,10 @@ class Service:
             link=link,
             publisher=None if publisher is None else publisher.status,
             memory_mib=resident_memory_mib(),
+            altitude_m=altitude_m(pose),
+            speed_mps=speed_mps(pose),
+            cp_delay_s=None if advice is None else advice.cp_delay_s,
+            margin_m=None if advice is None else advice.margin_m,
             recording=None if record is None else record.recording,
             recording_detail="" if record is None else record.problem,
         )

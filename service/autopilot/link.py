@@ -123,6 +123,19 @@ class AutopilotLink:
         with self._lock:
             self._session.say(severity, text, self._clock.now_ns())
 
+    def hold(self) -> str:
+        """Ask the vehicle once to stop and stay, in the mode that it has for that.
+
+        `status` tells the outcome.
+
+        Returns:
+            The mode that is asked for, empty if none is known.
+        """
+        with self._lock:
+            mode = self._session.ask_to_hold()
+        self._wake()
+        return mode
+
     def status(self) -> LinkStatus:
         """How the link is doing."""
         with self._lock:

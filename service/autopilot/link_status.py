@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from service.autopilot.hold_request import HoldOutcome
+
 
 @dataclass(frozen=True)
 class LinkStatus:
@@ -41,6 +43,7 @@ class LinkStatus:
         signed: our packets are signed, and only signed ones are believed.
         refused_packets: packets that were not believed, by what was wrong with their signature.
         other_system_ids: other autopilots that were heard and not listened to.
+        hold: what has become of the last request to stop and stay; None if there was none.
         problem: what is wrong, fit to show a user; None if nothing is.
     """
 
@@ -76,4 +79,5 @@ class LinkStatus:
     signed: bool = False
     refused_packets: Mapping[str, int] = field(default_factory=dict)
     other_system_ids: tuple[int, ...] = ()
+    hold: HoldOutcome | None = None
     problem: str | None = None

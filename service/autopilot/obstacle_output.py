@@ -15,6 +15,7 @@ from service.autopilot.profile_choice import ProfileChoice
 from service.autopilot.rate_meter import RateMeter
 from service.autopilot.scan_delivery import ScanDelivery
 from service.autopilot.telemetry_tracker import TelemetryTracker
+from service.autopilot.transport_delay import TransportDelay
 from service.settings.autopilot import AutopilotSettings
 from uavdepth.autopilot_profile import AutopilotProfile
 from uavdepth.obstacle_message import obstacle_words
@@ -31,7 +32,7 @@ class ObstacleOutput:
         settings: the `[autopilot]` section.
         bytes_per_s: what the line may carry; 0 for no limit.
         tracker: what the vehicle did, and does.
-        delivery: makes latency good.
+        transport: how long a message is under way.
         choice: the autopilot's layout.
         outbox: where messages leave.
     """
@@ -41,14 +42,14 @@ class ObstacleOutput:
         settings: AutopilotSettings,
         bytes_per_s: int,
         tracker: TelemetryTracker,
-        delivery: ScanDelivery,
+        transport: TransportDelay,
         choice: ProfileChoice,
         outbox: Outbox,
     ) -> None:
         self._max_age_ns = round(settings.max_frame_age_s * 1e9)
         self._sender = ObstacleSender(settings, bytes_per_s)
         self._tracker = tracker
-        self._delivery = delivery
+        self._delivery = ScanDelivery(tracker, transport)
         self._choice = choice
         self._outbox = outbox
         self._meter = RateMeter()

@@ -22,7 +22,6 @@ from service.autopilot.presence import Presence
 from service.autopilot.profile_choice import ProfileChoice
 from service.autopilot.rate_meter import RateMeter
 from service.autopilot.requests import Requests
-from service.autopilot.scan_delivery import ScanDelivery
 from service.autopilot.service_state import ServiceState
 from service.autopilot.signing import Signing
 from service.autopilot.signing_key import SigningKey
@@ -69,12 +68,7 @@ class LinkSession:
         self._outbox.set_system_id(settings.system_id or 1)
         self._transport = TransportDelay(settings.endpoint)
         self._obstacles = ObstacleOutput(
-            settings,
-            self._bytes_per_s,
-            self._tracker,
-            ScanDelivery(self._tracker, self._transport),
-            self._choice,
-            self._outbox,
+            settings, self._bytes_per_s, self._tracker, self._transport, self._choice, self._outbox
         )
         self._notices = Notices()
         self._watch = LinkWatch(self._notices, settings.endpoint)
@@ -137,17 +131,12 @@ class LinkSession:
         self._trust.on_vehicle(message)
         self._watch.protocol(is_mavlink1(message))
         reboots, steps = self._tracker.reboots, self._tracker.clock.steps
-        if name == "ATTITUDE":
-            self._tracker.on_attitude(message, arrival_ns)
-        elif name == "LOCAL_POSITION_NED":
-            self._tracker.on_position(message, arrival_ns)
-        elif name == "DISTANCE_SENSOR":
-            self._tracker.on_range(message)
-        elif name == "TIMESYNC":
+        self._tracker.on_message(message, arrival_ns)
+        if name == "TIMESYNC":
             self._on_timesync(message, arrival_ns)
         elif name == "AUTOPILOT_VERSION" and self._choice.on_version(message):
             self._tell_profile()
-        self._requests.on_message(name, arrival_ns)
+        self._requests.on_message(message, arrival_ns)
         if self._tracker.reboots != reboots:
             self._requests.restart()
             self._notices.news("the autopilot has rebooted: asking for its messages again")
@@ -161,9 +150,12 @@ class LinkSession:
         before = self._learner.vehicle
         hearing = self._learner.on_heartbeat(heartbeat, source, arrival_ns)
         vehicle = self._learner.vehicle
+        if hearing is Hearing.KNOWN and vehicle is not None:
+            self._requests.on_mode(vehicle)
         if hearing is Hearing.FOREIGN and vehicle is not None:
             self._watch.stranger(heartbeat.get_srcSystem(), vehicle.system_id)
         if hearing is Hearing.LEARNT and vehicle is not None:
+            self._requests.hold = None
             if before is not None:
                 self._tracker.forget()
             self._connection.new_vehicle()
@@ -233,6 +225,11 @@ class LinkSession:
         """Queue a STATUSTEXT; repeated texts are held back."""
         self._texts.say(severity, text, now_ns)
 
+    def ask_to_hold(self) -> str:
+        """Ask the vehicle to stop and stay; returns the mode that is asked for, empty if there is none."""
+        vehicle = self._learner.vehicle
+        return "" if vehicle is None else self._requests.ask_to_hold(vehicle)
+
     def ask(self, message: mavlink.MAVLink_message, expires_ns: int) -> None:
         """Queue a message of the caller's own; it leaves with the link's signature and within its budget."""
         self._outbox.put(message, expires_ns)
@@ -293,5 +290,6 @@ class LinkSession:
             signed=self._trust.signing is not None,
             refused_packets=dict(self._trust.refused),
             other_system_ids=tuple(sorted(self._learner.others)),
+            hold=self._requests.hold.outcome if self._requests.hold else None,
             problem=self._notices.standing,
         )

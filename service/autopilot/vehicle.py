@@ -44,6 +44,8 @@ class Vehicle:
         mode: flight mode by name.
         armed: motors armed.
         heard_ns: arrival of the HEARTBEAT, nanoseconds on the service's clock.
+        mav_type: what kind of vehicle it is (MAV_TYPE).
+        custom_mode: flight mode as the autopilot numbers it.
     """
 
     system_id: int
@@ -52,6 +54,8 @@ class Vehicle:
     mode: str
     armed: bool
     heard_ns: int
+    mav_type: int = mavlink.MAV_TYPE_GENERIC
+    custom_mode: int = 0
 
 
 class Hearing(Enum):
@@ -99,6 +103,8 @@ class VehicleLearner:
             mavutil.mode_string_v10(heartbeat),
             bool(heartbeat.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED),
             arrival_ns,
+            heartbeat.type,
+            heartbeat.custom_mode,
         )
         return Hearing.KNOWN if known else Hearing.LEARNT
 

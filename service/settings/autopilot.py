@@ -67,6 +67,14 @@ class AutopilotSettings(Section):
         "least 2100, which carries 10 a second; 0 takes 80 % of a serial port's rate, and sets no limit on a "
         "network.",
     )
+    on_loss: Literal["warn", "hold"] = Field(
+        default="warn",
+        title="When perception is lost",
+        description="`warn`: STATUSTEXT and HEARTBEAT CRITICAL within 0.5 s. `hold`: besides, 0.7 s after "
+        "the last distances, the autopilot is asked once for BRAKE (ArduCopter), HOLD (ArduRover) or Hold "
+        "(PX4), if the vehicle is armed, moves and flies in a mode that distances act in. Nothing is asked "
+        "of a pilot who has changed the mode since.",
+    )
     max_frame_age_s: float = Field(
         default=0.3,
         ge=0.05,
