@@ -21,6 +21,7 @@ from service.telemetry import Telemetry
 from service.trouble import Trouble
 from uavdepth.attitude import Attitude
 from uavdepth.errors import ImageMaskError, UavDepthError
+from uavdepth.model_card import ModelCard
 from uavdepth.obstacle_scan import ObstacleScan, SectorState
 from uavdepth.scan_memory import ScanMemory
 from uavdepth.scan_motion import PlanarPose
@@ -72,6 +73,8 @@ class Perception:
         self._scanner = scanner
         self._memory = ScanMemory(settings.scan.memory_s)
         self._model_failures = 0
+        self.model_card: ModelCard | None = None
+        """The network's card; None for a source of depth that has none."""
 
     @classmethod
     def load(cls, settings: Settings) -> Perception:
@@ -89,7 +92,9 @@ class Perception:
         if not answers_in_metres(card):
             scale = ScaleEstimator(settings.camera.model, settings.mount.mount, network_kind(card))
         max_depth_m = float("inf") if card.max_depth_m is None else card.max_depth_m
-        return cls(settings, model, scale, make_scanner(settings), max_depth_m, card.hints)
+        perception = cls(settings, model, scale, make_scanner(settings), max_depth_m, card.hints)
+        perception.model_card = card
+        return perception
 
     @property
     def model_failures(self) -> int:

@@ -268,7 +268,7 @@ class Service:
         return result.telemetry.armed is False and rangefinder_hz > 0
 
     def _model_card(self) -> str | None:
-        card = getattr(self._perception, "model_card", None)
+        card = None if self._perception is None else self._perception.model_card
         return None if card is None else card.to_json()
 
     def _tell_status(self) -> None:
