@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 POINTS, GROUND = "points", "ground"
 SOURCES = (POINTS, GROUND)
 
-_LASTING_S = {POINTS: 3.0, GROUND: 8.0}
+_LASTING_S = {POINTS: 8.0, GROUND: 8.0}
 """How long the error of a source keeps its sign: velocity errors by seconds, slopes and roofs by the time
 that a vehicle needs to leave them behind."""
 
@@ -27,6 +27,8 @@ _UNKNOWN = 4.0
 """Variance of a log scale of which nothing is known."""
 
 _FRESH_S = 2.0
+_WANDER_MEMORY_S = 0.7
+_LARGEST_WANDER = 0.5
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,8 @@ class ScaleFilter:
     against the other is remembered while only one of them speaks.
 
     Args:
-        wander_per_sqrt_s: how fast the network's own scale wanders, relative, by the square root of a second.
+        wander_per_sqrt_s: how fast the network's own scale wanders at least, relative, by the square root of
+            a second; where the points' readings wander faster it does too.
     """
 
     def __init__(self, wander_per_sqrt_s: float) -> None:
@@ -69,6 +72,8 @@ class ScaleFilter:
         self._lasting = dict.fromkeys(SOURCES, 0.0)
         self._beyond_s = dict.fromkeys(SOURCES, 0.0)
         self._accepted_s = dict.fromkeys(SOURCES, math.inf)
+        self._last_points: float | None = None
+        self._wander_variance = self._wander**2
 
     @property
     def known(self) -> bool:
@@ -92,6 +97,8 @@ class ScaleFilter:
     def shift(self, log_factor: float) -> None:
         """The unit of depth has changed by this log factor."""
         self._state[0] += log_factor
+        if self._last_points is not None:
+            self._last_points += log_factor
 
     def predict(self, passed_s: float) -> None:
         """Let time pass."""
@@ -102,7 +109,7 @@ class ScaleFilter:
             self._covariance[:, number] *= keep
             self._covariance[number, number] += (1 - keep**2) * self._lasting[source] ** 2
             self._accepted_s[source] += passed_s
-        self._covariance[0, 0] += self._wander**2 * passed_s
+        self._covariance[0, 0] += self._wander_variance * passed_s
 
     def take(self, readings: list[ScaleReading], passed_s: float) -> tuple[str, ...]:
         """Listen to what the sources say of one picture, the points first.
@@ -115,6 +122,7 @@ class ScaleFilter:
             The sources that were listened to.
         """
         taken = []
+        self._watch_wander(readings, passed_s)
         for source in SOURCES:
             reading = next((each for each in readings if each.source == source), None)
             if reading is not None and self._listen(reading, passed_s):
@@ -123,7 +131,13 @@ class ScaleFilter:
 
     def _listen(self, reading: ScaleReading, passed_s: float) -> bool:
         source, number = reading.source, SOURCES.index(reading.source) + 1
-        self._lasting[source] = reading.lasting_sigma
+        before, self._lasting[source] = self._lasting[source], reading.lasting_sigma
+        if source == POINTS and before > 0:
+            # The same wrong velocity is a larger share of a slower flight.
+            grown = reading.lasting_sigma / before
+            self._state[number] *= grown
+            self._covariance[number] *= grown
+            self._covariance[:, number] *= grown
         if not math.isfinite(self._accepted_s[source]) or self._accepted_s[source] > 5 * _LASTING_S[source]:
             self._state[number] = 0.0
             self._covariance[number] = self._covariance[:, number] = 0.0
@@ -137,7 +151,7 @@ class ScaleFilter:
             self._beyond_s[source] += passed_s
             if not self._gives_way(source):
                 return False
-            self._begin_anew(reading, number)
+            self._begin_anew(reading, number, surprise)
         else:
             self._state += gain * (surprise / variance)
             self._covariance -= np.outer(gain, gain) / variance
@@ -153,12 +167,28 @@ class ScaleFilter:
         # Slopes, roofs and valley floors deceive the ground; nothing but a wrong velocity deceives points.
         return source == POINTS or self._accepted_s[POINTS] > _FRESH_S
 
-    def _begin_anew(self, reading: ScaleReading, number: int) -> None:
+    def _begin_anew(self, reading: ScaleReading, number: int, surprise: float) -> None:
+        lasting = reading.lasting_sigma**2
+        if reading.source == GROUND:
+            # Either the ground deceives now or it did before: for a while both are as likely.
+            lasting += (0.5 * surprise) ** 2
         self._state = np.zeros(3)
         self._state[0] = reading.log_factor
         self._covariance = np.zeros((3, 3))
-        self._covariance[0, 0] = reading.lasting_sigma**2 + reading.own_sigma**2
-        self._covariance[number, number] = reading.lasting_sigma**2
-        self._covariance[0, number] = self._covariance[number, 0] = -(reading.lasting_sigma**2)
+        self._covariance[0, 0] = lasting + reading.own_sigma**2
+        self._covariance[number, number] = lasting
+        self._covariance[0, number] = self._covariance[number, 0] = -lasting
         for source in SOURCES:
             self._accepted_s[source] = math.inf
+
+    def _watch_wander(self, readings: list[ScaleReading], passed_s: float) -> None:
+        """How fast the scale wanders, from the steps between the points' readings: their lasting error is the
+        same in both."""
+        reading = next((each for each in readings if each.source == POINTS), None)
+        if reading is not None and self._last_points is not None and 0 < passed_s < _WANDER_MEMORY_S:
+            step = reading.log_factor - self._last_points
+            found = max(step**2 - 2 * reading.own_sigma**2, 0.0) / passed_s
+            share = 1.0 - math.exp(-passed_s / _WANDER_MEMORY_S)
+            self._wander_variance += share * (min(found, _LARGEST_WANDER**2) - self._wander_variance)
+            self._wander_variance = max(self._wander_variance, self._wander**2)
+        self._last_points = None if reading is None else reading.log_factor

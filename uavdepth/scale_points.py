@@ -151,7 +151,8 @@ def scale_from_points(sampled: SampledPoints) -> PointScale | None:
     own = float(robust @ sigma / robust.sum())
     return PointScale(
         centre,
-        math.hypot(shared, scatter / math.sqrt(worth)),
+        # Where no points lie the network is off by as much as it is anywhere.
+        math.hypot(shared, max(scatter, _NETWORK_SCATTER) / math.sqrt(worth)),
         scatter / math.sqrt(count),
         math.sqrt(max(scatter**2 - own**2, 0.0)),
         count,

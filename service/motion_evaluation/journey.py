@@ -52,18 +52,23 @@ class Moment:
 
 
 class Journey(Protocol):
-    """A row of moments of one camera.
+    """A row of moments of one camera."""
 
-    Attributes:
-        name: what it is called in the report.
-        group: "flight", "recorded", "kitti raw" or "kitti odometry": what it is summed up with.
-        camera, mount: the camera and how it sits on the vehicle.
-    """
+    @property
+    def name(self) -> str:
+        """What it is called in the report."""
 
-    name: str
-    group: str
-    camera: CameraModel
-    mount: CameraMount
+    @property
+    def group(self) -> str:
+        """What it is summed up with: "flight", "recorded", "kitti raw" or "kitti odometry"."""
+
+    @property
+    def camera(self) -> CameraModel:
+        """The camera."""
+
+    @property
+    def mount(self) -> CameraMount:
+        """How it sits on the vehicle."""
 
     def moments(self) -> Iterator[Moment]:
         """Every picture in turn."""
