@@ -39,9 +39,20 @@ def encode_depth_png(depth_m: NDArray[np.floating], near_m: float, far_m: float)
     Raises:
         DepthCodecError: an impossible span, or a depth that is not a two-dimensional array of numbers.
     """
-    written, data = cv2.imencode(".png", depth_codes(depth_m, near_m, far_m), _PNG_OPTIONS)
+    return encode_codes_png(depth_codes(depth_m, near_m, far_m))
+
+
+def encode_codes_png(codes: NDArray[np.uint8]) -> bytes:
+    """The PNG of (H, W) uint8 codes, as `depth_codes` makes them.
+
+    Raises:
+        DepthCodecError: codes of another type or shape.
+    """
+    if codes.dtype != np.uint8 or codes.ndim != 2 or not codes.size:
+        raise DepthCodecError(f"codes are {codes.dtype} {codes.shape}: an (H, W) array of uint8 is needed")
+    written, data = cv2.imencode(".png", codes, _PNG_OPTIONS)
     if not written:
-        raise DepthCodecError(f"OpenCV could not write a PNG of {np.shape(depth_m)} pixels")
+        raise DepthCodecError(f"OpenCV could not write a PNG of {codes.shape} pixels")
     return data.tobytes()
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -55,6 +55,22 @@ class ZenohSettings(Section):
         strict=False,
         title="Endpoints to connect to",
         description="Ground stations or routers to reach; tried again for as long as they are away.",
+    )
+    profile: Literal["full", "thin", "scan-only"] = Field(
+        default="full",
+        title="What is sent",
+        description="`full`: depth as lossless log-depth PNG, and the camera. `thin`: depth as H.264, for "
+        "links below 1 Mbit/s and for eyes only, and the camera; it needs the extra `video`. `scan-only`: "
+        "no pictures.",
+    )
+    max_kbit_per_s: float = Field(
+        default=8000.0,
+        ge=32.0,
+        le=1_000_000.0,
+        title="Most that pictures may take, kbit/s",
+        description="Pictures get fewer and smaller so that they stay below it, and below what ground "
+        "stations report as received. Viewers of other makers report nothing: for them this must be what the "
+        "link takes.",
     )
     depth_rate_hz: float = Field(
         default=10.0,

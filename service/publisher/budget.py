@@ -1,0 +1,128 @@
+"""How many bytes of pictures a second the link takes: found from what the ground reports as received.
+
+Slow growth and quick retreat on delay, as congestion controls do it that must leave room for others (LEDBAT,
+RFC 6817), with the plateau of CUBIC (RFC 9438) below the rate that was too much last. The delay is measured
+on the vehicle's clock alone.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict, deque
+from typing import Final
+
+from service.publisher.received import ReceivedReport
+
+START_BYTES_PER_S: Final = 60_000.0
+"""Until the first report: half of a link of 1 Mbit/s."""
+
+_MIN_BYTES_PER_S: Final = 4_000.0
+_UNREPORTED_NS: Final = 2_000_000_000
+"""Viewers that have not reported by then never will: the configured limit counts for them."""
+
+_LOST_NS: Final = 1_500_000_000
+"""So long without a report while pictures are sent: they do not arrive."""
+
+_HIGH_NS: Final = 100_000_000
+"""Waiting in queues, beyond the shortest delay seen, at which the budget shrinks. Scans share the queue and
+are to be 150 ms late at most."""
+
+_LOW_NS: Final = 50_000_000
+"""Waiting below which the budget grows."""
+
+_GROWTH: Final = 0.06
+_PROBING: Final = 0.004
+"""Growth with each report, below and near the rate that was too much last."""
+
+_NEAR: Final = 0.9
+_RETREAT: Final = 0.85
+_BASE_WINDOW_NS: Final = 20_000_000_000
+_MAX_SENT = 256
+_MAX_STATIONS = 8
+
+
+class PictureBudget:
+    """Bytes of pictures a second, between 4 kB and the configured limit.
+
+    Args:
+        limit_bytes_per_s: what the configuration allows.
+    """
+
+    def __init__(self, limit_bytes_per_s: float) -> None:
+        self._limit = limit_bytes_per_s
+        self.bytes_per_s = min(START_BYTES_PER_S, limit_bytes_per_s)
+        """What may be sent now."""
+        self.delay_ms: float | None = None
+        """From publishing to the report of it, by the newest report."""
+        self._too_much: float | None = None
+        self._sent: OrderedDict[tuple[str, int], int] = OrderedDict()
+        self._first_sent_ns: int | None = None
+        self._last_sent_ns: int | None = None
+        self._last_report_ns: int | None = None
+        self._shrunk_ns: int | None = None
+        self._delays: deque[tuple[int, int]] = deque()
+        self._stations: OrderedDict[str, int] = OrderedDict()
+
+    def sent(self, topic: str, index: int, now_ns: int) -> None:
+        """A picture was handed to the link."""
+        self._sent[topic, index] = now_ns
+        while len(self._sent) > _MAX_SENT:
+            self._sent.popitem(last=False)
+        self._last_sent_ns = now_ns
+        if self._first_sent_ns is None:
+            self._first_sent_ns = now_ns
+
+    def hear(self, report: ReceivedReport, now_ns: int, *, wants_more: bool = True) -> None:
+        """A ground station says what has arrived. Reports that fit nothing that was sent change nothing.
+
+        Args:
+            report: from the network.
+            now_ns: when it came, on the vehicle's clock.
+            wants_more: pictures are smaller or fewer than they should be.
+        """
+        sent_ns = self._sent.get((report.topic, report.index))
+        if sent_ns is None:
+            return
+        self._stations[report.station] = now_ns
+        self._stations.move_to_end(report.station)
+        while len(self._stations) > _MAX_STATIONS:
+            self._stations.popitem(last=False)
+        self._last_report_ns = now_ns
+        delay_ns = max(0, now_ns - sent_ns - round(report.age_ms * 1e6))
+        self.delay_ms = delay_ns / 1e6
+        waiting_ns = delay_ns - self._base_ns(delay_ns, now_ns)
+        if waiting_ns > _HIGH_NS:
+            # One retreat for each delay: what was sent after the last must first be seen to arrive.
+            if self._shrunk_ns is None or sent_ns > self._shrunk_ns:
+                arrived = 1e3 * report.size_bytes / max(report.interval_ms, 100.0)
+                self._too_much = min(self.bytes_per_s, max(arrived, 0.5 * self.bytes_per_s))
+                self._shrunk_ns = now_ns
+                self._set(_RETREAT * self._too_much)
+        elif waiting_ns < _LOW_NS and wants_more:
+            near = self._too_much is not None and self.bytes_per_s > _NEAR * self._too_much
+            # Each of several stations reports: together they must not grow faster than one.
+            self._set(self.bytes_per_s * (1 + (_PROBING if near else _GROWTH) / len(self._stations)))
+
+    def tick(self, now_ns: int) -> None:
+        """Notice reports that do not come."""
+        if self._last_report_ns is None:
+            if self._first_sent_ns is not None and now_ns - self._first_sent_ns > _UNREPORTED_NS:
+                self._set(self._limit)
+            return
+        if self._last_sent_ns is None or self._last_sent_ns <= self._last_report_ns:
+            return
+        if now_ns - max(self._last_report_ns, self._shrunk_ns or 0) > _LOST_NS:
+            self._shrunk_ns = now_ns
+            self._set(self.bytes_per_s / 2)
+
+    def _base_ns(self, delay_ns: int, now_ns: int) -> int:
+        """The shortest delay of the last 20 s: what the link takes when nothing waits."""
+        while self._delays and now_ns - self._delays[0][0] > _BASE_WINDOW_NS:
+            self._delays.popleft()
+        # A queue of falling minima: its front is the minimum of the window.
+        while self._delays and self._delays[-1][1] >= delay_ns:
+            self._delays.pop()
+        self._delays.append((now_ns, delay_ns))
+        return self._delays[0][1]
+
+    def _set(self, bytes_per_s: float) -> None:
+        self.bytes_per_s = min(max(bytes_per_s, min(_MIN_BYTES_PER_S, self._limit)), self._limit)
