@@ -13,8 +13,9 @@ from service.ground.frames import FrameKind, encode_frame
 from service.ground.hub import Hub
 from service.publisher import keys
 
-WINDOW: Final = 4
-"""Frames on their way that the browser has not shown yet. With one it would wait a round trip for each."""
+WINDOW: Final = 2
+"""Frames on their way that the browser has not shown yet. With one it would wait a round
+trip for each; with many a slow one would show old ones first."""
 
 STALL_S: Final = 20.0
 """A browser that shows nothing for so long is let go; its page comes back by itself."""

@@ -66,8 +66,8 @@ def bind(address: str, port: int) -> socket.socket:
     return server
 
 
-def serve(app: ASGIApp, server: socket.socket, tls: Tls | None) -> None:
-    """Serve until SIGINT or SIGTERM."""
+def make_server(app: ASGIApp, tls: Tls | None) -> uvicorn.Server:
+    """The web server; its `run` serves on sockets that `bind` made, until SIGINT or SIGTERM."""
     config = uvicorn.Config(
         app,
         log_config=None,
@@ -86,7 +86,7 @@ def serve(app: ASGIApp, server: socket.socket, tls: Tls | None) -> None:
         ssl_certfile=None if tls is None else tls.certificate,
         ssl_keyfile=None if tls is None else tls.key,
     )
-    uvicorn.Server(config).run(sockets=[server])
+    return uvicorn.Server(config)
 
 
 def _reason(error: OSError) -> str:

@@ -20,7 +20,7 @@ from service.ground.errors import GroundError
 from service.ground.fleet import Fleet
 from service.ground.hub import Hub
 from service.ground.listener import FleetListener
-from service.ground.server import Tls, bind, serve
+from service.ground.server import Tls, bind, make_server
 from service.settings.zenoh import check_endpoint
 
 _POLL_S = 0.05
@@ -173,7 +173,7 @@ class Station:
 
     def serve(self) -> None:
         """Serve until SIGINT or SIGTERM."""
-        serve(self._app.asgi, self._socket, self._settings.tls)
+        make_server(self._app.asgi, self._settings.tls).run(sockets=[self._socket])
 
 
 def _outward_address(*, is_ipv6: bool) -> str | None:
