@@ -157,3 +157,6 @@ class _NoPose:
 
     def telemetry_at(self, captured_ns: int) -> Telemetry:
         raise CameraError("there is no vehicle during a calibration")
+
+    def predicted_pose(self, at_ns: int) -> Telemetry:
+        raise CameraError("there is no vehicle during a calibration")

@@ -22,6 +22,9 @@ class Link(Protocol):
     def newest_pose(self) -> Telemetry:
         """What the vehicle did last."""
 
+    def predicted_pose(self, at_ns: int) -> Telemetry:
+        """What the vehicle will do at a moment that is about to come; empty if that is too far off."""
+
     def send_obstacles(self, scan: ObstacleScan, captured_ns: int) -> bool:
         """Take a scan as of its capture and send it as it is true when it leaves; False if not taken."""
 

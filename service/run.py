@@ -28,6 +28,7 @@ from service.recorder.recorder import Recorder
 from service.settings import Settings
 from service.status import Drops, Latency, ServiceStatus, altitude_m, resident_memory_mib, speed_mps
 from service.status_sample import status_sample
+from service.thread_rank import switch_quickly
 from service.trouble import Trouble
 from uavdepth.errors import UavDepthError
 
@@ -118,6 +119,7 @@ class Service:
         # OpenCV's own threads would take the cores from inference; what it has to say of cameras that
         # are not there, the reader says once and with the camera's name.
         cv2.setNumThreads(1)
+        switch_quickly()
         cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
         try:
             self._link.start()

@@ -99,6 +99,11 @@ class AutopilotLink:
         with self._lock:
             return self._session.newest_pose(self._clock.now_ns())
 
+    def predicted_pose(self, at_ns: int) -> Telemetry:
+        """What the vehicle will do at `at_ns`, up to 0.25 s after its newest messages."""
+        with self._lock:
+            return self._session.predicted_pose(at_ns)
+
     def send_obstacles(self, scan: ObstacleScan, captured_ns: int) -> bool:
         """Send the scan of the frame captured at `captured_ns`.
 

@@ -244,6 +244,10 @@ class LinkSession:
         """What held at the newest attitude, if that is at most 0.5 s old."""
         return self._with_mode(self._tracker.newest(now_ns), now_ns)
 
+    def predicted_pose(self, at_ns: int) -> Telemetry:
+        """What will hold at a moment up to 0.25 s after the newest messages, carried on by their rates."""
+        return self._tracker.predicted(at_ns)
+
     def _with_mode(self, telemetry: Telemetry, now_ns: int) -> Telemetry:
         vehicle = self._learner.vehicle
         if vehicle is None or now_ns - vehicle.heard_ns > self._timeout_ns:

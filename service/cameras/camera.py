@@ -41,6 +41,9 @@ class Camera(ABC):
     reopen_on_timeout = True
     """Whether a camera that delivers nothing is worth closing and opening again."""
 
+    stands_back = False
+    """Whether its thread computes, so that the flight path goes first where processors are few."""
+
     def __init__(self, settings: CameraSettings, clock: Clock) -> None:
         self.settings = settings
         self.clock = clock

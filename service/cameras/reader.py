@@ -12,6 +12,7 @@ from service.cameras.camera import Camera, CameraEndedError, CameraTimeoutError,
 from service.errors import CameraError, ConfigError
 from service.frame import Frame
 from service.latest_slot import LatestSlot
+from service.thread_rank import stand_back
 from uavdepth.errors import SceneError, UavDepthError
 
 log = structlog.get_logger()
@@ -98,6 +99,8 @@ class CameraReader:
             self._thread.join(_JOIN_TIMEOUT_S)
 
     def _run(self) -> None:
+        if self._camera.stands_back:
+            stand_back()
         pause_s = self._camera.settings.reopen_after_s
         while not self._stopping.is_set():
             frames_before = self._status.frames

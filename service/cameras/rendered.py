@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from typing import TYPE_CHECKING, Protocol
 
 from service.cameras.camera import Camera, CameraTimeoutError
@@ -19,6 +20,13 @@ if TYPE_CHECKING:
 _POLL_S = 0.005
 """How often a pose is looked for: far below the 20 ms between two poses of a 50 Hz stream."""
 
+_REMEMBERED_COSTS = 15
+_USUALLY_READY = 0.7
+"""Share of the pictures that are ready in the time that is planned for them."""
+
+_LONGEST_COST_NS = 150_000_000
+"""Poses are not carried on further: a vehicle that brakes would be seen at a wrong tilt."""
+
 _TAKE_OFF_NED_M = (0.0, 0.0, -1.0)
 """A metre above the origin, which is free ground in every scene."""
 
@@ -32,11 +40,16 @@ class PoseSource(Protocol):
     def telemetry_at(self, captured_ns: int) -> Telemetry:
         """The vehicle at a moment in the recent past."""
 
+    def predicted_pose(self, at_ns: int) -> Telemetry:
+        """The vehicle at a moment that is about to come."""
+
 
 class RenderedCamera(Camera):
     """Renders from the pose that the connected autopilot reports, so that any autopilot flies in the scene.
 
-    A frame's capture stamp is the time for which its pose holds; rendering counts as delivery.
+    A camera exposes while the computer does other things; rendering takes the computer's time instead. So a
+    picture is rendered for the moment at which it will be ready, from the autopilot's pose carried on by its
+    rates, and delivered then. Its capture stamp is that moment, the time for which its pose holds.
 
     Args:
         spec: `SCENE` or `SCENE:SEED`.
@@ -45,6 +58,7 @@ class RenderedCamera(Camera):
     """
 
     reopen_on_timeout = False
+    stands_back = True
 
     def __init__(
         self, settings: CameraSettings, clock: Clock, spec: str, mount: CameraMount, poses: PoseSource
@@ -56,6 +70,7 @@ class RenderedCamera(Camera):
         self._scene: Scene | None = None
         self._due_ns = 0
         self._last_pose_ns = -1
+        self._costs_ns: deque[int] = deque(maxlen=_REMEMBERED_COSTS)
         self._model = settings.model
 
     def open(self) -> None:
@@ -72,14 +87,27 @@ class RenderedCamera(Camera):
         if self._scene is None:
             raise CameraError(f"camera {self.name}: not open")
         self._wait((self._due_ns - self.clock.now_ns()) / 1e9)
-        pose = self._fresh_pose(timeout_s)
+        newest = self._fresh_pose(timeout_s)
+        begun_ns = self.clock.now_ns()
+        # A late picture does not make the following ones hurry.
+        self._due_ns = max(self._due_ns, begun_ns) + round(1e9 / self.settings.fps)
+        self._last_pose_ns = newest.at_ns
+        pose = self._pose_when_ready(newest, begun_ns)
         if pose.position_ned_m is None or pose.attitude is None:
             raise CameraError(f"camera {self.name}: a pose without position or attitude")
-        # A late picture does not make the following ones hurry.
-        self._due_ns = max(self._due_ns, self.clock.now_ns()) + round(1e9 / self.settings.fps)
-        self._last_pose_ns = pose.at_ns
         picture = self._scene.render(self._model, self._mount, pose.position_ned_m, pose.attitude)
+        now_ns = self.clock.now_ns()
+        self._costs_ns.append(now_ns - begun_ns)
+        self._wait((pose.at_ns - now_ns) / 1e9)
         return self._frame(picture.image_bgr, pose.at_ns)
+
+    def _pose_when_ready(self, newest: Telemetry, begun_ns: int) -> Telemetry:
+        """The pose for the moment at which the picture will be ready, or the newest if that is too far."""
+        if not self._costs_ns:
+            return newest
+        cost_ns = sorted(self._costs_ns)[round(_USUALLY_READY * (len(self._costs_ns) - 1))]
+        pose = self._poses.predicted_pose(begun_ns + min(cost_ns, _LONGEST_COST_NS))
+        return newest if pose.position_ned_m is None or pose.attitude is None else pose
 
     def _fresh_pose(self, timeout_s: float) -> Telemetry:
         """A pose that is newer than the last picture's and whole."""

@@ -128,6 +128,9 @@ class FakeLink:
     def newest_pose(self) -> Telemetry:
         return self.telemetry_at(self.clock.now_ns())
 
+    def predicted_pose(self, at_ns: int) -> Telemetry:
+        return self.telemetry_at(at_ns)
+
     def send_obstacles(self, scan: ObstacleScan, captured_ns: int) -> bool:
         if self.takes_obstacles:
             self.sent.append((scan, captured_ns))
