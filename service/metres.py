@@ -119,6 +119,12 @@ class Metres:
             return self._told_metres(frame, telemetry_at)
         return self._found_metres(frame, telemetry_at, self._found)
 
+    def without_hints(self, frame: Frame) -> DepthMap:
+        """What the network says of a picture alone, in units of its own."""
+        if self._found is None:
+            return self._model.infer(frame.image_bgr, self._camera, Hints())
+        return self._model.infer(frame.image_bgr, self._camera)
+
     # -- a network that takes hints
 
     def _told_metres(self, frame: Frame, telemetry_at: TelemetryAt) -> Measurement:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection
 from dataclasses import replace
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import structlog
@@ -25,6 +25,9 @@ from uavdepth.model_card import ModelCard
 from uavdepth.obstacle_scan import ObstacleScan, SectorState
 from uavdepth.scan_memory import ScanMemory
 from uavdepth.scan_motion import PlanarPose
+
+if TYPE_CHECKING:
+    from uavdepth.model_card import ModelCard
 
 __all__ = ["DepthSource", "Perception", "PerceptionResult", "ScaleSource", "Scanner", "unknown_scan"]
 
@@ -136,6 +139,16 @@ class Perception:
         if not result.trusted:
             self._memory.clear()
         return result
+
+    def look_at_mount(self, result: PerceptionResult) -> str | None:
+        """Hold the mount against the ground, if it is time to; to be called when a result has been sent.
+
+        Now and then it runs the network once more, so the next picture may be late.
+
+        Returns:
+            A text of at most 50 characters for the pilot, once, where the mount seems wrong.
+        """
+        return self._mount_watch.look(result.frame, result.telemetry)
 
     def _scan(self, blank: PerceptionResult, measured: Measurement) -> PerceptionResult:
         depth, attitude = measured.depth, measured.telemetry.attitude
