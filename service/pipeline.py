@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from service.errors import ConfigError
 from service.frame import Frame
 from service.metres import DepthSource, Measurement, Metres, ScaleSource
+from service.mount_watch import MountWatch
 from service.network import answers_in_metres, load_network, network_kind
 from service.perception_result import PerceptionResult, unknown_scan
 from service.settings import Settings
@@ -75,6 +76,7 @@ class Perception:
         self._metres = Metres(settings, model, scale, takes, model_max_depth_m)
         self._scanner = scanner
         self._memory = ScanMemory(settings.scan.memory_s)
+        self._mount_watch = MountWatch(settings, self._metres.without_hints)
         self._model_failures = 0
         self.model_card: ModelCard | None = None
         """The network's card; None for a source of depth that has none."""

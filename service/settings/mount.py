@@ -55,7 +55,7 @@ class MountSettings(Section):
         le=600.0,
         title="Time between two looks at the mount, seconds",
         description="In flight, one picture in so long is measured without any hint and its ground held "
-        "against the mount; pitch or roll that are more than 2 degrees off are told once, as STATUSTEXT and in "
+        "against the mount; pitch or roll more than 2 degrees off are told once, as STATUSTEXT and in "
         "the log. It takes 20 pictures of level ground with the vehicle turning. 0: never.",
     )
 
