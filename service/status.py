@@ -69,7 +69,6 @@ class ServiceStatus:
         speed_mps: speed over ground; None if not heard.
         recording: whether a record is being written; None where no recorder is set up.
         recording_detail: what is wrong with the record, in words; empty if nothing.
-        stream_profile: what is sent to the ground; None if it has no name.
         cp_delay_s, margin_m: CP_DELAY and margin that the measured latency asks for; None if not known.
     """
 
@@ -97,7 +96,6 @@ class ServiceStatus:
     speed_mps: float | None = None
     recording: bool | None = None
     recording_detail: str = ""
-    stream_profile: str | None = None
     cp_delay_s: float | None = None
     margin_m: float | None = None
 

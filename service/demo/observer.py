@@ -56,7 +56,7 @@ class GroundObserver(Listener):
         self._samples = 0
         self._jpeg: bytes | None = None
         self._depth: tuple[bytes, bytes] | None = None
-        super().__init__(connect, self.board, clock)
+        super().__init__([connect], self.board, clock)
         for topic in (keys.CAMERA, keys.DEPTH):
             self._session.declare_subscriber(keys.key(vehicle, topic), self._take_picture)
 

@@ -7,18 +7,15 @@ from typing import Annotated
 
 import typer
 
-DEFAULT_CONNECT = "tcp/127.0.0.1:7447"
+from service.security.options import SecurityConfigOption
+from service.viewer_endpoints import ConnectOption
+
 TOKEN_VARIABLE = "UAVDEPTH_GROUND_TOKEN"
 
 
 def ground(
-    connect: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Zenoh endpoint of a vehicle or router; may be given many times. "
-            f"Without --listen: {DEFAULT_CONNECT}."
-        ),
-    ] = None,
+    config: SecurityConfigOption = None,
+    connect: ConnectOption = None,
     listen: Annotated[
         list[str] | None, typer.Option(help="Zenoh endpoint where vehicles connect; may be given many times.")
     ] = None,
@@ -55,6 +52,7 @@ def ground(
     from service.ground.station import Station, StationSettings
 
     settings = StationSettings.checked(
+        config=config,
         connect=connect or [],
         listen=listen or [],
         port=port,

@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 
 from service.clock import Clock
 from service.freshness import ArrivalClock, Freshness
+from service.ground.errors import PictureError
 from service.ground.history import HistoryPoint, NearestHistory, Reading, reading_of
-from service.ground.pictures import PictureError, check_grey_png, check_jpeg
+from service.ground.pictures import check_grey_png, check_jpeg
 from service.ground.traffic import Traffic, TrafficView
 from service.publisher import keys
 from service.publisher.wire import CameraHeader, DepthHeader, ScanSample, StatusSample, WireError
@@ -144,6 +145,12 @@ class Fleet:
             vehicle.changes += 1
         if name is not None:
             self._on_change(name)
+
+    def note_bad(self, why: str) -> None:
+        """Count a sample that was not understood before it came here."""
+        with self._lock:
+            self._bad_samples += 1
+            self._last_bad = why
 
     def hear_alive(self, key: str, alive: bool) -> None:
         """Take the coming or going of a liveliness token."""

@@ -1,38 +1,61 @@
-"""The ground station's Zenoh session: it feeds the fleet."""
+"""The ground station's Zenoh sessions: they feed the fleet."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
+from contextlib import ExitStack
 from types import TracebackType
 from typing import Self
 
 import zenoh
 
+from service.clock import Clock
 from service.ground.fleet import Fleet
 from service.publisher import keys
-from service.publisher.session import open_session
+from service.publisher.picture_receiver import PictureReceiver
+from service.publisher.session import Role, open_session
+from service.publisher.wire import MAX_SAMPLE_BYTES
+from service.security.security import Security
 
 
 class FleetListener:
     """Subscribes to scans, status and liveliness of all vehicles, and to the pictures of those watched.
 
-    Pictures that nobody looks at stay where they are: the vehicles do not even send them. A context
-    manager. Peers that are away are reached when they come.
+    Pictures that nobody looks at stay where they are: the vehicles do not even send them. Pictures come
+    over a session of their own, so that no scan waits for one; vehicles that connect to `listen` open one
+    of their own for them. A context manager. Peers that are away are reached when they come.
 
     Args:
         listen, connect: Zenoh endpoints.
         fleet: takes the samples.
+        clock: the viewer's.
+        security: certificates and passwords; None: none of them.
 
     Raises:
+        SecurityError: certificates, keys or passwords that cannot be used.
         PublisherError: a session that cannot be opened.
     """
 
-    def __init__(self, listen: Sequence[str], connect: Sequence[str], fleet: Fleet) -> None:
+    def __init__(
+        self,
+        listen: Sequence[str],
+        connect: Sequence[str],
+        fleet: Fleet,
+        clock: Clock,
+        security: Security | None = None,
+    ) -> None:
         self._fleet = fleet
+        self._clock = clock
         self._lock = threading.Lock()
-        self._pictures: dict[str, list[zenoh.Subscriber[None]]] = {}
-        self._session = open_session(listen, connect)
+        self._receivers: dict[str, list[PictureReceiver]] = {}
+        with ExitStack() as stack:
+            self._session = stack.enter_context(open_session(listen, connect, security, Role.STATION))
+            self._picture_sessions: list[zenoh.Session] = [self._session] if listen else []
+            if connect:
+                own = stack.enter_context(open_session([], connect, security, Role.STATION))
+                self._picture_sessions.append(own)
+            self._sessions = stack.pop_all()
         for topic in (keys.SCAN, keys.STATUS):
             self._session.declare_subscriber(keys.key("*", topic), self._hear)
         self._session.liveliness().declare_subscriber(
@@ -51,29 +74,40 @@ class FleetListener:
         self.close()
 
     def close(self) -> None:
-        """Close the session."""
-        self._session.close()  # type: ignore[no-untyped-call]
+        """Close the sessions."""
+        self._sessions.close()
 
     def watch(self, vehicles: set[str]) -> None:
         """Receive the pictures of these vehicles and of no others."""
         with self._lock:
-            for name in set(self._pictures) - vehicles:
-                for subscriber in self._pictures.pop(name):
-                    subscriber.undeclare()
-            for name in vehicles - set(self._pictures):
-                self._pictures[name] = [
-                    self._session.declare_subscriber(keys.key(name, topic), self._hear)
-                    for topic in (keys.CAMERA, keys.DEPTH)
-                ]
+            for name in set(self._receivers) - vehicles:
+                for receiver in self._receivers.pop(name):
+                    receiver.close()
+            for name in vehicles - set(self._receivers):
+                self._receivers[name] = [self._receive(session, name) for session in self._picture_sessions]
         self._fleet.forget_pictures(vehicles)
 
     def peer_count(self) -> int:
-        """Peers and routers that are connected now."""
+        """Vehicles and routers that are connected now."""
         return len(self._session.info.peers_zid()) + len(self._session.info.routers_zid())
 
+    def _receive(self, session: zenoh.Session, vehicle: str) -> PictureReceiver:
+        return PictureReceiver(
+            session,
+            vehicle,
+            self._fleet.hear,
+            self._clock,
+            lambda why: self._fleet.note_bad(f"video of {vehicle}: {why}"),
+        )
+
     def _hear(self, sample: zenoh.Sample) -> None:
-        attachment = None if sample.attachment is None else sample.attachment.to_bytes()
-        self._fleet.hear(str(sample.key_expr), sample.payload.to_bytes(), attachment)
+        key = str(sample.key_expr)
+        if len(sample.payload) > MAX_SAMPLE_BYTES:
+            self._fleet.note_bad(
+                f"{key[:100]}: {len(sample.payload)} bytes: at most {MAX_SAMPLE_BYTES} are read"
+            )
+            return
+        self._fleet.hear(key, sample.payload.to_bytes(), None)
 
     def _hear_alive(self, sample: zenoh.Sample) -> None:
         self._fleet.hear_alive(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)

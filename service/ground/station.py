@@ -15,13 +15,13 @@ from service.clock import Clock, MonotonicClock
 from service.errors import ConfigError
 from service.ground.access import Access, check_token, is_loopback, make_token
 from service.ground.app import GroundApp
-from service.ground.command import DEFAULT_CONNECT
 from service.ground.errors import GroundError
 from service.ground.fleet import Fleet
 from service.ground.hub import Hub
 from service.ground.listener import FleetListener
 from service.ground.server import Tls, bind, make_server
-from service.settings.zenoh import check_endpoint
+from service.security.security import Security
+from service.viewer_endpoints import viewer_endpoints
 
 _POLL_S = 0.05
 
@@ -37,6 +37,7 @@ class StationSettings:
         made_token: the token was made up here and has to be told.
         host_names: names of the station besides its addresses.
         tls: certificate of the page; None for plain HTTP.
+        security: of the Zenoh sessions.
     """
 
     connect: tuple[str, ...]
@@ -47,11 +48,13 @@ class StationSettings:
     made_token: bool
     host_names: tuple[str, ...]
     tls: Tls | None
+    security: Security | None = None
 
     @classmethod
     def checked(
         cls,
         *,
+        config: Path | None,
         connect: Sequence[str],
         listen: Sequence[str],
         port: int,
@@ -66,14 +69,7 @@ class StationSettings:
         Raises:
             ConfigError: an option that cannot be used; the text names it.
         """
-        if not connect and not listen:
-            connect = [DEFAULT_CONNECT]
-        for option, endpoints in (("--connect", connect), ("--listen", listen)):
-            for endpoint in endpoints:
-                try:
-                    check_endpoint(endpoint)
-                except ValueError as error:
-                    raise ConfigError(f"{option}: {error}") from error
+        zenoh = viewer_endpoints(config, connect, listen)
         if (certificate is None) != (key is None):
             raise ConfigError("--certificate and --key belong together: give both or neither")
         tls = None
@@ -87,7 +83,9 @@ class StationSettings:
                 check_token(token)
         except GroundError as error:
             raise ConfigError(str(error)) from error
-        return cls(tuple(connect), tuple(listen), port, bind, token, made_token, tuple(host_names), tls)
+        return cls(
+            zenoh.connect, zenoh.listen, port, bind, token, made_token, tuple(host_names), tls, zenoh.security
+        )
 
 
 class Station:
@@ -108,7 +106,9 @@ class Station:
         with ExitStack() as stack:
             self._socket: socket.socket = stack.enter_context(bind(settings.bind, settings.port))
             fleet = Fleet(clock)
-            self._listener = stack.enter_context(FleetListener(settings.listen, settings.connect, fleet))
+            self._listener = stack.enter_context(
+                FleetListener(settings.listen, settings.connect, fleet, clock, settings.security)
+            )
             hub = Hub(fleet, self._listener, (*settings.connect, *settings.listen), clock)
             access = Access(settings.token, settings.host_names)
             self._app = GroundApp(hub, access, settings.port, secure=settings.tls is not None)

@@ -21,7 +21,7 @@ from uavdepth.obstacle_scan import (
 WIRE_VERSION: Final = 1
 """Grows when a reader of the older version would misunderstand a sample."""
 
-_MAX_SAMPLE_BYTES = 65_536
+MAX_SAMPLE_BYTES: Final = 65_536
 """No scan, header or status is near it: larger text from the network is not even parsed."""
 
 _MAX_WORDS = 500
@@ -56,8 +56,8 @@ class _Message(BaseModel):
         Raises:
             WireError: anything else, another version included.
         """
-        if len(data) > _MAX_SAMPLE_BYTES:
-            raise WireError(f"{cls.__name__} of {len(data)} bytes: at most {_MAX_SAMPLE_BYTES} are read")
+        if len(data) > MAX_SAMPLE_BYTES:
+            raise WireError(f"{cls.__name__} of {len(data)} bytes: at most {MAX_SAMPLE_BYTES} are read")
         try:
             return cls.model_validate_json(data)
         except ValidationError as error:
@@ -212,6 +212,7 @@ class StatusSample(_Message):
         scale_factor, scale_relative_sigma, scale_age_s: metric scale of the newest picture; None if it has
             none. A network that answers in metres has the factor 1 and a sigma of its own.
         scale_sources: what told it, e.g. "ground", "points".
+        scale_suspicion: what seems to be wrong with it, in words; None if nothing.
         height_m, mode, armed: of the vehicle; None if not heard.
         altitude_m: height above the origin of the autopilot's local frame (where it was started).
         speed_mps: speed over ground.
@@ -244,6 +245,7 @@ class StatusSample(_Message):
     scale_relative_sigma: float | None = None
     scale_age_s: float | None = None
     scale_sources: tuple[Words, ...] = Field(default=(), max_length=8)
+    scale_suspicion: Words | None = None
     height_m: float | None = None
     mode: Words | None = None
     armed: bool | None = None

@@ -3,31 +3,22 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
-from enum import Enum
+from dataclasses import dataclass, field
 
+from service.freshness import ArrivalClock, Freshness
 from service.publisher import keys
 from service.publisher.wire import ScanSample, StatusSample, WireError
 
-STALE_NS = 1_000_000_000
-NO_DATA_NS = 3_000_000_000
 _MAX_VEHICLES = 200
 """A peer that invents names must not fill the memory."""
-
-
-class Freshness(Enum):
-    """How old the newest scan is, by the viewer's own clock."""
-
-    LIVE = "live"
-    STALE = "stale"
-    NO_DATA = "no data"
 
 
 @dataclass
 class _Vehicle:
     alive: bool = False
+    clock: ArrivalClock = field(default_factory=ArrivalClock)
     scan: ScanSample | None = None
-    scan_ns: int | None = None
+    scan_born_ns: int | None = None
     status: StatusSample | None = None
     status_ns: int | None = None
     scans: int = 0
@@ -41,7 +32,7 @@ class VehicleView:
         name: of the vehicle.
         alive: its Zenoh session lives (liveliness; no sign of fresh data).
         freshness: of the newest scan.
-        age_s: since it arrived, seconds; None before the first.
+        age_s: since its picture was taken, seconds; None before the first.
         scan: the newest scan, None if there is none or it is too old to show.
         status: the newest status, None if there is none or it is too old to show.
         scans: that arrived since the start.
@@ -86,7 +77,8 @@ class Board:
                 if topic == keys.SCAN:
                     scan = ScanSample.decode(payload)
                     entry = self._entry(vehicle)
-                    entry.scan, entry.scan_ns, entry.scans = scan, now_ns, entry.scans + 1
+                    entry.scan, entry.scans = scan, entry.scans + 1
+                    entry.scan_born_ns = now_ns - entry.clock.hear(scan.captured_ns, scan.age_ms, now_ns)
                 else:
                     status = StatusSample.decode(payload)
                     entry = self._entry(vehicle)
@@ -121,18 +113,15 @@ class Board:
 
     @staticmethod
     def _view(name: str, entry: _Vehicle, now_ns: int) -> VehicleView:
-        age_ns = None if entry.scan_ns is None else now_ns - entry.scan_ns
-        if age_ns is None or age_ns > NO_DATA_NS:
-            freshness = Freshness.NO_DATA
-        else:
-            freshness = Freshness.STALE if age_ns > STALE_NS else Freshness.LIVE
-        status_fresh = entry.status_ns is not None and now_ns - entry.status_ns <= NO_DATA_NS
+        age_ns = None if entry.scan_born_ns is None else now_ns - entry.scan_born_ns
+        freshness = Freshness.of(age_ns)
+        status_age_ns = None if entry.status_ns is None else now_ns - entry.status_ns
         return VehicleView(
             name=name,
             alive=entry.alive,
             freshness=freshness,
             age_s=None if age_ns is None else age_ns / 1e9,
             scan=None if freshness is Freshness.NO_DATA else entry.scan,
-            status=entry.status if status_fresh else None,
+            status=None if Freshness.of(status_age_ns) is Freshness.NO_DATA else entry.status,
             scans=entry.scans,
         )

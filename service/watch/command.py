@@ -8,15 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from service.security.options import SecurityConfigOption
+from service.viewer_endpoints import ConnectOption, viewer_endpoints
+
 if TYPE_CHECKING:
     from service.clock import Clock
     from service.watch.board import Board
 
 
 def watch(
-    connect: Annotated[
-        str, typer.Option(help="Zenoh endpoint of the vehicle or of a router.")
-    ] = "tcp/127.0.0.1:7447",
+    config: SecurityConfigOption = None,
+    connect: ConnectOption = None,
     once: Annotated[
         bool, typer.Option("--once", help="Wait for data, show it once and end; exit code 1 if none came.")
     ] = False,
@@ -28,28 +30,24 @@ def watch(
 ) -> None:
     """Show scan and status of vehicles live."""
     from service.clock import MonotonicClock
-    from service.errors import ConfigError
-    from service.settings.zenoh import check_endpoint
     from service.watch.board import Board
     from service.watch.listener import Listener
 
-    try:
-        check_endpoint(connect)
-    except ValueError as error:
-        raise ConfigError(f"--connect: {error}") from error
+    zenoh = viewer_endpoints(config, connect or [])
+    places = ", ".join((*zenoh.connect, *zenoh.listen))
     board, clock = Board(), MonotonicClock()
     # Set by hand, since a program that a shell starts in the background inherits SIGINT as ignored.
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda _number, _frame: stop.set())
-    with Listener(connect, board, clock):
+    with Listener(zenoh.connect, board, clock, zenoh.listen, zenoh.security):
         if once:
-            raise typer.Exit(0 if _show_once(board, clock, connect, timeout_s, as_json, stop) else 1)
-        _show_live(board, clock, connect, period_s, as_json, stop)
+            raise typer.Exit(0 if _show_once(board, clock, places, timeout_s, as_json, stop) else 1)
+        _show_live(board, clock, places, period_s, as_json, stop)
 
 
 def _show_once(
-    board: Board, clock: Clock, connect: str, timeout_s: float, as_json: bool, stop: threading.Event
+    board: Board, clock: Clock, places: str, timeout_s: float, as_json: bool, stop: threading.Event
 ) -> bool:
     """Show the board as soon as a vehicle has scan and status, or at the time-out; whether one was heard."""
     from service.watch.view import board_json, render_board
@@ -67,12 +65,12 @@ def _show_once(
     else:
         from rich.console import Console
 
-        Console().print(render_board(board, connect, now_ns))
+        Console().print(render_board(board, places, now_ns))
     return any(view.scan is not None or view.status is not None for view in board.vehicles(now_ns))
 
 
 def _show_live(
-    board: Board, clock: Clock, connect: str, period_s: float, as_json: bool, stop: threading.Event
+    board: Board, clock: Clock, places: str, period_s: float, as_json: bool, stop: threading.Event
 ) -> None:
     from service.watch.view import board_json, render_board
 
@@ -86,5 +84,5 @@ def _show_live(
 
     with Live(console=Console(), auto_refresh=False, screen=False) as live:
         while not stop.is_set():
-            live.update(render_board(board, connect, clock.now_ns()), refresh=True)
+            live.update(render_board(board, places, clock.now_ns()), refresh=True)
             stop.wait(period_s)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import TracebackType
 from typing import Self
 
@@ -9,7 +10,8 @@ import zenoh
 
 from service.clock import Clock
 from service.publisher import keys
-from service.publisher.session import open_session
+from service.publisher.session import Role, open_session
+from service.security.security import Security
 from service.watch.board import Board
 
 
@@ -17,18 +19,28 @@ class Listener:
     """Subscribes to scans, status and liveliness of all vehicles. A context manager.
 
     Args:
-        connect: endpoint of the vehicle or router; one that is away is reached when it comes.
+        connect: endpoints of vehicles or routers; one that is away is reached when it comes.
         board: takes the samples.
         clock: ages them.
+        listen: endpoints where vehicles connect.
+        security: certificates and passwords; None: none of them.
 
     Raises:
+        SecurityError: certificates, keys or passwords that cannot be used.
         PublisherError: a session that cannot be opened.
     """
 
-    def __init__(self, connect: str, board: Board, clock: Clock) -> None:
+    def __init__(
+        self,
+        connect: Sequence[str],
+        board: Board,
+        clock: Clock,
+        listen: Sequence[str] = (),
+        security: Security | None = None,
+    ) -> None:
         self._board = board
         self._clock = clock
-        self._session = open_session([], [connect])
+        self._session = open_session(listen, connect, security, Role.STATION)
         for topic in (keys.SCAN, keys.STATUS):
             self._session.declare_subscriber(keys.key("*", topic), self._hear)
         self._session.liveliness().declare_subscriber(

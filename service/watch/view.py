@@ -11,8 +11,9 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
+from service.freshness import Freshness
 from service.publisher.wire import ScanSample, StatusSample
-from service.watch.board import Board, Freshness, VehicleView
+from service.watch.board import Board, VehicleView
 from uavdepth.obstacle_scan import SectorState
 
 _BLOCKS = " ▁▂▃▄▅▆▇█"
@@ -24,12 +25,12 @@ _FRESHNESS_STYLES = {
 }
 
 
-def render_board(board: Board, connect: str, now_ns: int) -> RenderableType:
+def render_board(board: Board, places: str, now_ns: int) -> RenderableType:
     """Everything that is known, one panel a vehicle."""
     views = board.vehicles(now_ns)
     parts: list[RenderableType] = [_vehicle_panel(view) for view in views]
     if not views:
-        parts.append(Text(f"no vehicle heard at {connect} yet", style="yellow"))
+        parts.append(Text(f"no vehicle heard at {places} yet", style="yellow"))
     if board.bad_samples:
         parts.append(Text(f"{board.bad_samples} samples not understood: {board.last_bad}", style="yellow"))
     return Group(*parts)
@@ -111,14 +112,32 @@ def _status_rows(status: StatusSample | None) -> RenderableType:
     scale = "-"
     if status.scale_factor is not None and status.scale_relative_sigma is not None:
         scale = f"{status.scale_factor:.2f} ±{100 * status.scale_relative_sigma:.0f} %"
+        if status.scale_sources:
+            scale += f" ({', '.join(status.scale_sources)})"
     table.add_row("state", state, "latency p50 / p95", latency)
-    table.add_row("rate", f"{status.frames_per_s:.1f}/s", "scale", scale)
+    table.add_row("rate", f"{status.frames_per_s:.1f}/s", "scale", escape(scale))
     autopilot = "not connected"
     if status.link_connected:
         armed = {True: "armed", False: "disarmed", None: ""}[status.armed]
         autopilot = f"{status.autopilot or '?'} {status.mode or ''} {armed}".strip()
-    height = "-" if status.height_m is None else f"{status.height_m:.1f} m"
-    table.add_row("autopilot", escape(autopilot), "height", height)
-    table.add_row("camera", escape(status.camera), "messages", str(status.obstacle_messages))
-    notes = [text for text in (status.camera_detail, status.link_detail) if text]
+    table.add_row("autopilot", escape(autopilot), "height", _with_unit(status.height_m, "m"))
+    messages = str(status.obstacle_messages)
+    if status.obstacle_rate_hz is not None:
+        messages += f", {status.obstacle_rate_hz:.1f}/s"
+    table.add_row("camera", escape(status.camera), "messages", messages)
+    table.add_row(
+        "altitude", _with_unit(status.altitude_m, "m"), "speed", _with_unit(status.speed_mps, "m/s")
+    )
+    if status.cp_delay_s is not None and status.margin_m is not None:
+        table.add_row("advised", f"margin {status.margin_m:.1f} m", "CP_DELAY", f"{status.cp_delay_s:.2f} s")
+    if status.recording is not None:
+        table.add_row(
+            "record", "recording" if status.recording else Text("NOT RECORDING", style="bold yellow")
+        )
+    details = (status.camera_detail, status.link_detail, status.recording_detail, status.scale_suspicion)
+    notes = [text for text in details if text]
     return Group(table, *(Text(note, style="yellow") for note in notes))
+
+
+def _with_unit(value: float | None, unit: str) -> str:
+    return "-" if value is None else f"{value:.1f} {unit}"

@@ -196,7 +196,7 @@ def station(token: str | None = None, clock: Clock | None = None) -> Iterator[Ru
     with (
         bind("127.0.0.1", 0) as server_socket,
         open_session([endpoint], []) as vehicles,
-        FleetListener([], [endpoint], fleet) as listener,
+        FleetListener([], [endpoint], fleet, clock) as listener,
     ):
         port: int = server_socket.getsockname()[1]
         hub = Hub(fleet, listener, (endpoint,), clock)

@@ -10,9 +10,10 @@ from program_fakes import free_port, wait_until
 from rich.console import Console
 
 from service.clock import MonotonicClock
+from service.freshness import Freshness
 from service.publisher.session import open_session
 from service.publisher.wire import ScanSample, StatusSample
-from service.watch.board import Board, Freshness
+from service.watch.board import Board
 from service.watch.listener import Listener
 from service.watch.view import board_json, render_board
 from uavdepth.obstacle_scan import ObstacleScan, SectorState, sector_bearings_deg
@@ -172,7 +173,7 @@ def test_json_has_the_same_facts() -> None:
 def test_a_vehicle_is_heard_over_the_loopback_also_if_it_comes_later() -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     board = Board()
-    with Listener(endpoint, board, MonotonicClock()), open_session([endpoint], []) as vehicle:
+    with Listener([endpoint], board, MonotonicClock()), open_session([endpoint], []) as vehicle:
         token = vehicle.liveliness().declare_token("uavdepth/kite/alive")
 
         def heard() -> bool:
