@@ -12,6 +12,7 @@ MESSAGE_IDS = frozenset(
         mavlink.MAVLINK_MSG_ID_TIMESYNC,
         mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR,
         mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+        mavlink.MAVLINK_MSG_ID_COMMAND_ACK,
     }
 )
 """Messages that the link reads; the others are counted as bytes and skipped undecoded."""
