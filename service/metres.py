@@ -21,7 +21,7 @@ from service.vehicle_height import VehicleHeight
 from uavdepth.camera import CameraModel
 from uavdepth.depth_map import DepthMap
 from uavdepth.hints import GroundHint, Hints, PointHints
-from uavdepth.scale_estimator import ScaleEstimate, apply
+from uavdepth.scale_estimator import NetworkKind, ScaleEstimate, apply
 
 TelemetryAt = Callable[[int], Telemetry]
 
@@ -37,6 +37,10 @@ class DepthSource(Protocol):
 
 class ScaleSource(Protocol):
     """What finds the metres of a network's depth (`uavdepth.scale_estimator.ScaleEstimator`)."""
+
+    @property
+    def kind(self) -> NetworkKind:
+        """What the network's answer is."""
 
     def update(
         self, depth: DepthMap, ground: GroundHint | None, points: PointHints | None, captured_ns: int

@@ -73,6 +73,8 @@ class Perception:
         takes: Collection[str] = ALL_HINTS,
     ) -> None:
         self._scan_settings = settings.scan
+        self._model, self._scale = model, scale
+        self._model_max_depth_m, self._takes = model_max_depth_m, takes
         self._metres = Metres(settings, model, scale, takes, model_max_depth_m)
         self._scanner = scanner
         self._memory = ScanMemory(settings.scan.memory_s)
@@ -100,6 +102,23 @@ class Perception:
         perception = cls(settings, model, scale, make_scanner(settings), max_depth_m, card.hints)
         perception.model_card = card
         return perception
+
+    def beside(self, settings: Settings) -> Perception:
+        """The chain for another camera, with the same network and a memory of its own.
+
+        Args:
+            settings: the same but for camera and mount.
+
+        Raises:
+            ConfigError: a mask that does not fit the camera.
+        """
+        from uavdepth.scale_estimator import ScaleEstimator
+
+        scale = self._scale
+        if scale is not None:
+            scale = ScaleEstimator(settings.camera.model, settings.mount.mount, scale.kind)
+        scanner = make_scanner(settings)
+        return Perception(settings, self._model, scale, scanner, self._model_max_depth_m, self._takes)
 
     @property
     def model_failures(self) -> int:
@@ -161,7 +180,7 @@ class Perception:
         if np.all(scan.state == SectorState.UNKNOWN):
             # ArduPilot reads "unknown everywhere" as healthy and free (measured): silence is the only no.
             return result.distrusted(Trouble.NO_DEPTH)
-        return replace(result, scan=self._memory.merge(scan, blank.captured_ns, _pose(measured.telemetry)))
+        return replace(result, scan=self._memory.merge(scan, blank.captured_ns, pose_of(measured.telemetry)))
 
 
 def make_scanner(settings: Settings) -> Scanner:
@@ -191,7 +210,7 @@ def make_scanner(settings: Settings) -> Scanner:
     )
 
 
-def _pose(telemetry: Telemetry) -> PlanarPose | None:
+def pose_of(telemetry: Telemetry) -> PlanarPose | None:
     """Where the vehicle was at capture, seen from above; None where it does not know."""
     attitude, position = telemetry.attitude, telemetry.position_ned_m
     if attitude is None or position is None:

@@ -26,6 +26,7 @@ from service.progress import Progress
 from service.publisher.publisher import ZenohPublisher
 from service.recorder.recorder import Recorder
 from service.settings import Settings
+from service.side_cameras import SideCameras
 from service.status import Drops, Latency, ServiceStatus, altitude_m, resident_memory_mib, speed_mps
 from service.status_sample import status_sample
 from service.thread_rank import switch_quickly
@@ -83,6 +84,7 @@ class Service:
                 settings.camera.source, settings.camera, self._clock, self._link, settings.mount.mount
             )
         self._reader = CameraReader(camera, self._frames)
+        self._sides = SideCameras(settings, self._clock, self._link)
         self._publisher: ZenohPublisher | None = None
         if settings.zenoh.enabled:
             self._publisher = ZenohPublisher(
@@ -128,6 +130,7 @@ class Service:
             if self._publisher is not None:
                 self._publisher.start()
             self._perception = self._load_perception(self._settings)
+            self._sides.start(self._perception)
             if self._recorder is not None:
                 self._recorder.start()
         except UavDepthError:
@@ -151,6 +154,7 @@ class Service:
         self._stopping.set()
         self._frames.close()
         self._reader.stop()
+        self._sides.stop()
         self._monitor.stop()
         if self._thread.is_alive():
             self._thread.join(_JOIN_TIMEOUT_S)
@@ -243,7 +247,7 @@ class Service:
 
     def _handle(self, perception: Perception, frame: Frame) -> None:
         begun_ns = self._clock.now_ns()
-        result = perception.step_late(frame, self._link.telemetry_at)
+        result = self._sides.added_to(perception.step_late(frame, self._link.telemetry_at))
         done_ns = self._clock.now_ns()
         if self._stands_ready(result):
             # "Unknown everywhere": ArduPilot refuses to arm before it has heard a proximity sensor.
@@ -258,6 +262,9 @@ class Service:
         if self._recorder is not None:
             self._recorder.offer(result, begun_ns, done_ns)
         self._hand_out(result)
+        mount = perception.look_at_mount(result)
+        if mount is not None:
+            self._link.say(SEVERITY_WARNING, mount)
 
     def _stands_ready(self, result: PerceptionResult) -> bool:
         """Whether all is well but the vehicle stands: disarmed, and too low to tell the scale.

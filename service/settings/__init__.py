@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from pydantic import Field
+from typing import Self
+
+from pydantic import Field, model_validator
 
 from service.settings.autopilot import AutopilotSettings
 from service.settings.camera import CameraSettings
+from service.settings.extra_camera import ExtraCameraSettings
 from service.settings.log import LogSettings
 from service.settings.model import ModelSettings
 from service.settings.motion import MotionSettings
@@ -20,6 +23,7 @@ from service.settings.zenoh import ZenohSettings
 __all__ = [
     "AutopilotSettings",
     "CameraSettings",
+    "ExtraCameraSettings",
     "LogSettings",
     "ModelSettings",
     "MotionSettings",
@@ -37,6 +41,7 @@ class Settings(Section):
     """The whole configuration. Only `[camera] source` has no default."""
 
     camera: CameraSettings
+    extra_camera: tuple[ExtraCameraSettings, ...] = Field(default=(), strict=False)
     vehicle: VehicleSettings = Field(default_factory=VehicleSettings)
     mount: MountSettings = Field(default_factory=MountSettings)
     model: ModelSettings = Field(default_factory=ModelSettings)
@@ -47,3 +52,11 @@ class Settings(Section):
     zenoh: ZenohSettings = Field(default_factory=ZenohSettings)
     record: RecordSettings = Field(default_factory=RecordSettings)
     log: LogSettings = Field(default_factory=LogSettings)
+
+    @model_validator(mode="after")
+    def _names_each_camera_once(self) -> Self:
+        names = [extra.name for extra in self.extra_camera]
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise ValueError(f"two of [[extra_camera]] have the name {twice}: give each its own")
+        return self

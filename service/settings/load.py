@@ -6,7 +6,7 @@ import difflib
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -95,6 +95,13 @@ def section_model(section: str) -> type[BaseModel] | None:
     return annotation if isinstance(annotation, type) and issubclass(annotation, BaseModel) else None
 
 
+def table_model(name: str) -> type[BaseModel] | None:
+    """The model of one table of a list of tables (`[[name]]`), or None if there is no such list."""
+    annotation = Settings.model_fields[name].annotation if name in Settings.model_fields else None
+    inner = get_args(annotation)[0] if get_origin(annotation) is tuple else None
+    return inner if isinstance(inner, type) and issubclass(inner, BaseModel) else None
+
+
 def _toml_value(text: str) -> Any:
     """`text` read as TOML; what is no TOML value (an URL, a path, a name) is text as it stands."""
     try:
@@ -160,7 +167,10 @@ def _unknown_key(location: list[str]) -> str:
 def _known_names(path: list[str]) -> list[str]:
     if not path:
         return list(Settings.model_fields)
-    model = section_model(path[0])
+    model = section_model(path[0]) or table_model(path[0])
+    for name in path[1:]:
+        inner = model.model_fields[name].annotation if model and name in model.model_fields else None
+        model = inner if isinstance(inner, type) and issubclass(inner, BaseModel) else None
     return list(model.model_fields) if model is not None else []
 
 

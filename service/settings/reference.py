@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from service.settings import Settings
-from service.settings.load import section_model
+from service.settings.load import section_model, table_model
 
 EXAMPLE_VALUES = {("camera", "source"): "0", ("camera", "horizontal_fov_deg"): 78.0}
 """What the example says where a key has no default or is needed for the example to be valid."""
@@ -27,8 +27,8 @@ def reference_markdown() -> str:
         "One TOML file. Unknown keys, wrong types and values out of bounds stop the program at once.",
         "",
     ]
-    for name, model in _sections():
-        lines += [f"## [{name}]", "", _sentence(model), ""]
+    for title, model in [*((f"[{name}]", model) for name, model in _sections()), *_lists_of_tables()]:
+        lines += [f"## {title}", "", _sentence(model), ""]
         lines += ["| key | type and bounds | default | meaning |", "|---|---|---|---|"]
         for key, field in model.model_fields.items():
             meaning = f"{field.title}. {field.description or ''}".strip()
@@ -53,6 +53,8 @@ def example_toml() -> str:
             value = EXAMPLE_VALUES.get((name, key), _default(field))
             lines.append(f"# {key} =" if value is None else f"{key} = {_toml(value)}")
             lines.append("")
+    for title, model in _lists_of_tables():
+        lines += [f"# {title}", f"# {_sentence(model)}", ""]
     return "\n".join(lines)
 
 
@@ -61,6 +63,13 @@ def _sections() -> Iterator[tuple[str, type[BaseModel]]]:
         model = section_model(name)
         if model is not None:
             yield name, model
+
+
+def _lists_of_tables() -> Iterator[tuple[str, type[BaseModel]]]:
+    for name in Settings.model_fields:
+        model = table_model(name)
+        if model is not None:
+            yield f"[[{name}]]", model
 
 
 def _sentence(model: type[BaseModel]) -> str:
@@ -76,6 +85,8 @@ def _default_words(field: FieldInfo) -> str:
     if field.is_required():
         return "**required**"
     value = _default(field)
+    if isinstance(value, BaseModel):
+        return "its defaults"
     return "none" if value is None else f"`{_toml(value)}`"
 
 
@@ -115,6 +126,8 @@ def _annotation_words(annotation: Any) -> str:
         return " or ".join(_annotation_words(part) for part in get_args(annotation) if part is not type(None))
     if origin is tuple:
         return f"list of {_annotation_words(get_args(annotation)[0])}"
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return "table"
     names: dict[Any, str] = {bool: "true or false", int: "whole number", float: "number", str: "text"}
     return names.get(annotation, str(annotation))
 

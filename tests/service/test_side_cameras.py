@@ -1,0 +1,193 @@
+"""Several cameras make one message (R12); a side that fails is unknown, and said to be so."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from program_fakes import (
+    FLYING_HEIGHT_M,
+    FakeLink,
+    FixedDepth,
+    ScriptedCamera,
+    make_settings,
+    picture,
+    wait_until,
+    wall_over_ground,
+)
+
+from service.cameras.camera import Camera
+from service.clock import MonotonicClock
+from service.errors import CameraError, ConfigError
+from service.frame import Frame
+from service.perception_result import PerceptionResult
+from service.pipeline import Perception, make_scanner
+from service.run import Service
+from service.settings import ExtraCameraSettings, Settings
+from service.settings.load import load_settings
+from service.settings.reference import reference_markdown
+from service.side_cameras import SideCameras
+from service.telemetry import Telemetry
+from service.trouble import Trouble
+from uavdepth.attitude import Attitude
+from uavdepth.obstacle_scan import SectorState
+from uavdepth.scale_estimator import ScaleEstimator
+
+AHEAD, RIGHT = 31, 31 + 18
+"""Elements along the nose and at 90 degrees."""
+
+WALL_M = 8.0
+
+
+def settings_with_a_right_camera() -> Settings:
+    plain = make_settings("scan.sigma_factor=0")
+    right = ExtraCameraSettings.model_validate(
+        {
+            "name": "right",
+            "camera": plain.camera.model_dump(),
+            "mount": {"yaw_deg": 90.0},
+        }
+    )
+    return plain.model_copy(update={"extra_camera": (right,)})
+
+
+SETTINGS = settings_with_a_right_camera()
+CAMERA = SETTINGS.camera.model
+
+
+def main_perception() -> Perception:
+    """A wall at 8 m before every camera that looks with this network."""
+    model = FixedDepth(wall_over_ground(CAMERA, WALL_M))
+    scale = ScaleEstimator(CAMERA, SETTINGS.mount.mount)
+    return Perception(SETTINGS, model, scale, make_scanner(SETTINGS))
+
+
+@contextmanager
+def looking(link: FakeLink, camera: Camera) -> Iterator[tuple[SideCameras, Perception]]:
+    sides = SideCameras(SETTINGS, link.clock, link, lambda extra: camera)
+    perception = main_perception()
+    sides.start(perception)
+    try:
+        yield sides, perception
+    finally:
+        sides.stop()
+
+
+def endless(acts: list[np.ndarray | Exception] | None = None) -> ScriptedCamera:
+    clock = MonotonicClock()
+    return ScriptedCamera(SETTINGS, clock, [picture()] if acts is None else acts, forever=acts is None)
+
+
+def look(perception: Perception, link: FakeLink) -> PerceptionResult:
+    now_ns = link.clock.now_ns()
+    return perception.step(Frame(picture(), now_ns, 0), link.telemetry_at(now_ns))
+
+
+def test_r12_two_cameras_make_one_scan_with_the_obstacles_of_both() -> None:
+    link = FakeLink(MonotonicClock())
+    with looking(link, endless()) as (sides, perception):
+        alone = look(perception, link)
+        assert alone.scan.state[RIGHT] == SectorState.UNKNOWN
+        wait_until(lambda: sides.added_to(look(perception, link)).scan.state[RIGHT] == SectorState.OBSTACLE)
+        both = sides.added_to(look(perception, link))
+    assert both.scan.state[AHEAD] == SectorState.OBSTACLE
+    assert both.scan.distance_m[AHEAD] == pytest.approx(WALL_M, rel=0.05)
+    assert both.scan.distance_m[RIGHT] == pytest.approx(WALL_M, rel=0.05)
+
+
+def test_a_side_is_turned_with_the_vehicle_to_the_moment_of_the_main_picture() -> None:
+    link = FakeLink(MonotonicClock())
+    with looking(link, endless()) as (sides, perception):
+        wait_until(lambda: sides.added_to(look(perception, link)).scan.state[RIGHT] == SectorState.OBSTACLE)
+        main = look(perception, link)
+        # 30 degrees to the right since: what was at 90 degrees is at 60.
+        telemetry = replace(main.telemetry, attitude=Attitude(0.0, 0.0, math.radians(30)))
+        turned = sides.added_to(replace(main, telemetry=telemetry))
+    span = np.flatnonzero(turned.scan.state == SectorState.OBSTACLE)
+    straight = np.flatnonzero(look(main_perception(), link).scan.state == SectorState.OBSTACLE)
+    # The side's right edge, 40 degrees beyond its middle, moves from 130 to 100 degrees.
+    assert span.max() <= straight.max() + 18 - 6 + 1
+    assert turned.scan.state[RIGHT - 6] == SectorState.OBSTACLE
+
+
+def test_a_side_that_dies_is_unknown_and_the_pilot_is_told() -> None:
+    link = FakeLink(MonotonicClock())
+    with looking(link, endless([picture()] * 20 + [CameraError("unplugged")])) as (sides, perception):
+        wait_until(lambda: sides.added_to(look(perception, link)).scan.state[RIGHT] == SectorState.OBSTACLE)
+
+        def is_lost() -> bool:
+            result = sides.added_to(look(perception, link))
+            assert result.trusted
+            return any(text == "uavdepth: camera right OFF" for _, text in link.said)
+
+        wait_until(is_lost)
+        assert sides.added_to(look(perception, link)).scan.state[RIGHT] == SectorState.UNKNOWN
+
+
+def test_a_main_camera_in_trouble_silences_all() -> None:
+    link = FakeLink(MonotonicClock())
+    with looking(link, endless()) as (sides, perception):
+        wait_until(lambda: sides.added_to(look(perception, link)).scan.state[RIGHT] == SectorState.OBSTACLE)
+        blind = perception.step(Frame(picture(), link.clock.now_ns(), 0), Telemetry(0, None, FLYING_HEIGHT_M))
+        assert blind.trouble is Trouble.NO_ATTITUDE
+        assert sides.added_to(blind) is blind
+
+
+def test_the_service_sends_what_all_cameras_see(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("service.side_cameras.make_camera", lambda *_: endless())
+    link = FakeLink(MonotonicClock())
+    service = Service(
+        SETTINGS, link=link, camera=endless(), load_perception=lambda _settings: main_perception()
+    )
+    service.start()
+    try:
+        wait_until(lambda: any(scan.state[RIGHT] == SectorState.OBSTACLE for scan, _ in link.sent[-5:]))
+    finally:
+        service.stop()
+    scan = link.sent[-1][0]
+    assert scan.state[AHEAD] == SectorState.OBSTACLE
+
+
+# -- the configuration
+
+
+def test_cameras_are_listed_in_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "uavdepth.toml"
+    path.write_text(
+        '[camera]\nsource = "sim:wall"\n'
+        '[[extra_camera]]\nname = "left"\n'
+        'camera = { source = "1", horizontal_fov_deg = 70.0 }\nmount = { yaw_deg = -60.0 }\n'
+        '[[extra_camera]]\nname = "right"\n'
+        '[extra_camera.camera]\nsource = "2"\nhorizontal_fov_deg = 70.0\n'
+        "[extra_camera.mount]\nyaw_deg = 60.0\n"
+    )
+    settings = load_settings(path, [])
+    assert [extra.name for extra in settings.extra_camera] == ["left", "right"]
+    assert settings.extra_camera[1].mount.mount.yaw_deg == 60.0
+    assert "## [[extra_camera]]" in reference_markdown()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('name = "a"\ncamera = { source = "1", horizontal_fov_deg = 700.0 }', "camera horizontal_fov_deg"),
+        ('name = "a"\ncamera = { source = "1" }', "no calibration"),
+        ('name = "a"\ncamera = { sorce = "1" }', "did you mean source"),
+        ('camera = { source = "1", horizontal_fov_deg = 70.0 }', "name: is missing"),
+        (
+            'name = "a"\ncamera = { source = "1", horizontal_fov_deg = 70.0 }\n[[extra_camera]]\nname = "a"\n'
+            'camera = { source = "2", horizontal_fov_deg = 70.0 }',
+            "have the name a",
+        ),
+    ],
+)
+def test_a_camera_that_is_wrong_is_named(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "uavdepth.toml"
+    path.write_text(f'[camera]\nsource = "sim:wall"\n[[extra_camera]]\n{text}\n')
+    with pytest.raises(ConfigError, match=words):
+        load_settings(path, [])
