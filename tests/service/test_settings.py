@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from service.errors import ConfigError
 from service.settings import Settings
-from service.settings.load import load_settings, section_model, table_model, parse_override
+from service.settings.load import load_settings, parse_override, section_model, table_model
 from service.settings.reference import example_toml, reference_markdown
 from service.settings.zenoh import check_endpoint
 
