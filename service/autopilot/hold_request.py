@@ -131,6 +131,7 @@ class HoldRequest:
             return
         if ack.result == mavlink.MAV_RESULT_ACCEPTED:
             self.outcome = HoldOutcome.GRANTED
+            self._flown_in = self._modes[0].custom_mode
         elif ack.result != mavlink.MAV_RESULT_IN_PROGRESS:
             self._refused()
 
@@ -147,8 +148,6 @@ class HoldRequest:
         if not self._modes:
             return
         if custom_mode == self._modes[0].custom_mode:
-            if self.outcome in (HoldOutcome.ASKED, HoldOutcome.UNANSWERED):
-                self.outcome = HoldOutcome.GRANTED
-            self._flown_in = custom_mode
+            self.outcome, self._flown_in = HoldOutcome.GRANTED, custom_mode
         elif custom_mode != self._flown_in:
             self.outcome = HoldOutcome.OVERRULED

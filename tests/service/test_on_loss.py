@@ -1,0 +1,318 @@
+"""What is done when perception is lost: the pilot is told at once, and the vehicle is asked to stop, once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+from link_support import Conversation, Flight, Voice
+from numpy.typing import NDArray
+from program_fakes import (
+    FLYING_HEIGHT_M,
+    ScriptedCamera,
+    make_settings,
+    picture,
+    wait_until,
+    wall_over_ground,
+)
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from service.autopilot.hold_request import HoldOutcome
+from service.clock import MonotonicClock
+from service.errors import CameraError
+from service.fake_autopilot.fake_autopilot import FakeAutopilot
+from service.fake_autopilot.pilot import Pilot
+from service.hold_on_loss import HoldOnLoss, Moment
+from service.pipeline import Perception
+from service.run import Service
+from service.settings import Settings
+from service.trouble import Trouble
+from uavdepth.camera import CameraModel
+from uavdepth.depth_map import DepthMap
+from uavdepth.hints import Hints
+from uavdepth.scanner import ObstacleScanner
+
+S, MS = 1_000_000_000, 1_000_000
+PX4_HOLD = 4 << 16 | 3 << 24
+LAST_MESSAGE_NS = 10 * S
+
+
+def well(at_ns: int = LAST_MESSAGE_NS, **values: Any) -> Moment:
+    """Distances are sent; a moving, armed ArduCopter in LOITER."""
+    known: dict[str, Any] = {
+        "trouble": None,
+        "sent_ns": at_ns,
+        "protected": True,
+        "armed": True,
+        "autopilot": "ardupilot",
+        "mode": "LOITER",
+        "speed_mps": 3.0,
+    }
+    return Moment(at_ns, **{**known, **values})
+
+
+def lost(after_s: float, **values: Any) -> Moment:
+    """So long after the last message."""
+    at_ns = LAST_MESSAGE_NS + round(after_s * 1e9)
+    return well(at_ns, **{"trouble": Trouble.CAMERA_LOST, "sent_ns": LAST_MESSAGE_NS, **values})
+
+
+def asked(*moments: Moment, on_loss: HoldOnLoss | None = None) -> int:
+    """How often the vehicle is asked."""
+    on_loss = on_loss or HoldOnLoss()
+    return sum(on_loss.hear(moment) for moment in moments)
+
+
+class TestWhenItIsAsked:
+    def test_a_moving_vehicle_is_asked_once_0_7_s_after_the_last_message(self) -> None:
+        on_loss = HoldOnLoss()
+        assert asked(well(), lost(0.45), lost(0.69), on_loss=on_loss) == 0
+        assert asked(lost(0.71), on_loss=on_loss) == 1
+        assert asked(*[lost(0.75 + 0.05 * k) for k in range(100)], on_loss=on_loss) == 0
+
+    @pytest.mark.parametrize(
+        "trouble", [Trouble.STALLED, Trouble.MODEL_FAILED, Trouble.NO_HEIGHT, Trouble.NOT_SENT]
+    )
+    def test_whatever_the_reason(self, trouble: Trouble) -> None:
+        assert asked(well(), lost(1.0, trouble=trouble)) == 1
+
+    @pytest.mark.parametrize(
+        "values",
+        [
+            {"armed": False},
+            {"armed": None, "protected": False},
+            {"protected": False},
+            {"speed_mps": 0.2},
+            {"speed_mps": None},
+            {"trouble": Trouble.LINK_LOST},
+        ],
+    )
+    def test_nothing_is_asked_of_a_vehicle_that_was_not_protected_or_does_not_move(
+        self, values: dict[str, Any]
+    ) -> None:
+        assert asked(well(), lost(1.0, **values)) == 0
+
+    @pytest.mark.parametrize(
+        ("autopilot", "mode", "count"),
+        [
+            ("ardupilot", "LOITER", 1),
+            ("ardupilot", "GUIDED", 1),
+            ("ardupilot", "ALT_HOLD", 1),
+            ("ardupilot", "AUTO", 0),
+            ("ardupilot", "STABILIZE", 0),
+            ("px4", "POSCTL", 1),
+            ("px4", "OFFBOARD", 0),
+            ("generic", "LOITER", 0),
+        ],
+    )
+    def test_only_in_modes_that_distances_act_in(self, autopilot: str, mode: str, count: int) -> None:
+        values = {"autopilot": autopilot, "mode": mode}
+        assert asked(well(**values), lost(1.0, **values)) == count
+
+    def test_a_vehicle_that_was_held_at_the_wall_is_asked_when_it_begins_to_move(self) -> None:
+        on_loss = HoldOnLoss()
+        still = [lost(0.7 + 0.1 * k, speed_mps=0.1) for k in range(12)]
+        assert asked(well(speed_mps=0.0), *still, on_loss=on_loss) == 0
+        assert asked(lost(2.0, speed_mps=0.6), on_loss=on_loss) == 1
+
+    def test_who_flies_on_by_hand_five_seconds_later_is_left_alone(self) -> None:
+        assert asked(well(speed_mps=0.0), lost(4.9, speed_mps=0.0), lost(6.0), lost(7.0)) == 0
+
+    def test_a_pilot_who_has_changed_the_mode_is_not_asked_even_back_in_the_first_mode(self) -> None:
+        assert asked(well(), lost(0.5, mode="STABILIZE"), lost(0.8), lost(1.5)) == 0
+
+    def test_a_pilot_who_takes_over_after_the_request_is_not_asked_again(self) -> None:
+        taken_over = [lost(1.0, mode="BRAKE"), lost(2.0), lost(3.0)]
+        assert asked(well(), lost(0.8), *taken_over) == 1
+
+    def test_a_flicker_of_perception_does_not_ask_the_pilot_who_has_taken_over(self) -> None:
+        on_loss = HoldOnLoss()
+        assert asked(well(), lost(0.8), on_loss=on_loss) == 1
+        back_ns = LAST_MESSAGE_NS + 5 * S
+        assert asked(well(back_ns), well(back_ns + S), on_loss=on_loss) == 0
+        again = well(back_ns + 2 * S, trouble=Trouble.STALLED, sent_ns=back_ns + S)
+        assert asked(again, on_loss=on_loss) == 0
+
+    @pytest.mark.parametrize("how", ["recovered", "armed again"])
+    def test_after_3_s_of_distances_or_a_new_arming_a_new_loss_is_a_new_one(self, how: str) -> None:
+        on_loss = HoldOnLoss()
+        assert asked(well(), lost(0.8), on_loss=on_loss) == 1
+        back_ns = LAST_MESSAGE_NS + 5 * S
+        if how == "armed again":
+            on_loss.hear(well(back_ns, armed=False))
+            on_loss.hear(well(back_ns + S))
+            last_ns = back_ns + S
+        else:
+            for tenth in range(32):
+                on_loss.hear(well(back_ns + tenth * 100 * MS))
+            last_ns = back_ns + 3100 * MS
+        again = well(last_ns + S, trouble=Trouble.STALLED, sent_ns=last_ns)
+        assert asked(again, on_loss=on_loss) == 1
+
+
+@dataclass
+class Talk:
+    """A session beside a vehicle that answers what the test wants."""
+
+    autopilot: int = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
+    kind: int = mavlink.MAV_TYPE_QUADROTOR
+    mode: int = 5
+    talk: Conversation = field(default_factory=lambda: Conversation(S))
+    voice: Voice = field(default_factory=Voice)
+
+    def __post_init__(self) -> None:
+        self.beat(self.mode)
+
+    def beat(self, mode: int) -> None:
+        self.talk.hear(self.voice.heartbeat(self.kind, self.autopilot, custom_mode=mode))
+
+    def answer(self, result: int, component: int = 196) -> None:
+        ack = mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_DO_SET_MODE, result, 0, 0, 1, component)
+        self.talk.hear(self.voice.pack(ack))
+
+    @property
+    def commands(self) -> list[tuple[float, float, int]]:
+        """Main mode, sub mode and confirmation of the requests sent."""
+        return [
+            (m.param2, m.param3, m.confirmation)
+            for _, m in self.talk.sent_of("COMMAND_LONG")
+            if m.command == mavlink.MAV_CMD_DO_SET_MODE
+        ]
+
+    @property
+    def outcome(self) -> HoldOutcome | None:
+        return self.talk.session.status(self.talk.now_ns).hold
+
+
+class TestHowItIsAsked:
+    @pytest.mark.parametrize(
+        ("autopilot", "kind", "mode", "name", "command"),
+        [
+            (mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, mavlink.MAV_TYPE_QUADROTOR, 5, "BRAKE", (17, 0, 0)),
+            (mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, mavlink.MAV_TYPE_HEXAROTOR, 4, "BRAKE", (17, 0, 0)),
+            (mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, mavlink.MAV_TYPE_GROUND_ROVER, 15, "HOLD", (4, 0, 0)),
+            (mavlink.MAV_AUTOPILOT_PX4, mavlink.MAV_TYPE_QUADROTOR, 3 << 16, "Hold", (4, 3, 0)),
+        ],
+    )
+    def test_each_vehicle_by_its_own_mode(
+        self, autopilot: int, kind: int, mode: int, name: str, command: tuple[int, int, int]
+    ) -> None:
+        talk = Talk(autopilot, kind, mode)
+        assert talk.talk.session.ask_to_hold() == name
+        talk.talk.wait_s(0.1)
+        talk.answer(mavlink.MAV_RESULT_ACCEPTED)
+        talk.talk.wait_s(2.0)
+        assert talk.commands == [command]
+        assert talk.outcome is HoldOutcome.GRANTED
+
+    def test_a_vehicle_without_such_a_mode_is_not_asked(self) -> None:
+        talk = Talk(kind=mavlink.MAV_TYPE_FIXED_WING)
+        assert talk.talk.session.ask_to_hold() == ""
+        talk.talk.wait_s(1.0)
+        assert talk.commands == []
+        assert talk.outcome is HoldOutcome.IMPOSSIBLE
+
+    def test_a_lost_command_is_sent_again_twice(self) -> None:
+        talk = Talk()
+        talk.talk.session.ask_to_hold()
+        talk.talk.wait_s(3.0)
+        assert [confirmation for *_, confirmation in talk.commands] == [0, 1, 2]
+        assert talk.outcome is HoldOutcome.UNANSWERED
+
+    def test_a_refused_brake_becomes_loiter_and_a_refused_loiter_is_the_end(self) -> None:
+        talk = Talk(mode=4)
+        talk.talk.session.ask_to_hold()
+        for _ in range(2):
+            talk.talk.wait_s(0.1)
+            talk.answer(mavlink.MAV_RESULT_FAILED)
+        talk.talk.wait_s(2.0)
+        assert [main for main, *_ in talk.commands] == [17, 5]
+        assert talk.outcome is HoldOutcome.REFUSED
+
+    def test_the_answer_to_another_stations_command_is_not_taken_for_ours(self) -> None:
+        talk = Talk()
+        talk.talk.session.ask_to_hold()
+        talk.talk.wait_s(0.1)
+        talk.answer(mavlink.MAV_RESULT_FAILED, component=190)
+        assert talk.outcome is HoldOutcome.ASKED
+
+    def test_a_mode_that_somebody_else_has_chosen_ends_the_request(self) -> None:
+        talk = Talk()
+        talk.talk.session.ask_to_hold()
+        talk.talk.wait_s(0.1)
+        talk.beat(0)
+        talk.talk.wait_s(2.0)
+        assert len(talk.commands) == 1
+        assert talk.outcome is HoldOutcome.OVERRULED
+
+    def test_a_granted_request_is_not_sent_again_when_the_pilot_flies_on(self) -> None:
+        talk = Talk()
+        talk.talk.session.ask_to_hold()
+        talk.talk.wait_s(0.1)
+        talk.beat(17)
+        assert talk.outcome is HoldOutcome.GRANTED
+        talk.beat(5)
+        talk.talk.wait_s(2.0)
+        assert len(talk.commands) == 1
+        assert talk.outcome is HoldOutcome.OVERRULED
+
+    def test_nothing_is_asked_before_an_autopilot_is_heard(self) -> None:
+        talk = Conversation(S)
+        assert talk.session.ask_to_hold() == ""
+        Flight(talk, Voice()).fly(1.0)
+        assert talk.session.status(talk.now_ns).hold is None
+
+
+class SeesAWall:
+    """A network that is told the ground and sees a wall 8 m ahead, whatever the picture."""
+
+    def infer(
+        self, image_bgr: NDArray[np.uint8], camera: CameraModel, hints: Hints | None = None
+    ) -> DepthMap:
+        height_m = hints.ground.height_m if hints and hints.ground else FLYING_HEIGHT_M
+        return DepthMap(wall_over_ground(camera, 8.0, height_m), None)
+
+
+def sees_a_wall(settings: Settings) -> Perception:
+    camera, mount = settings.camera.model, settings.mount.mount
+    scanner = ObstacleScanner(camera, mount, sigma_factor=0.0)
+    return Perception(settings, SeesAWall(), None, scanner, takes=("ground",))
+
+
+@pytest.mark.parametrize(
+    ("flavor", "parameters", "flown_in", "stopped_in"),
+    [
+        ("ardupilot", {"PRX_FILT": 0.0}, "LOITER", "BRAKE"),
+        ("px4", {"CP_DIST": 3.0}, "POSCTL", "AUTO.LOITER"),
+    ],
+)
+def test_a_camera_that_dies_in_flight_stops_the_vehicle_and_a_pilot_who_takes_over_flies(
+    flavor: Any, parameters: dict[str, float], flown_in: str, stopped_in: str
+) -> None:
+    """Real MAVLink over TCP; only the camera and the network are stand-ins."""
+    with FakeAutopilot(flavor, "tcp:127.0.0.1:0", parameters=parameters) as autopilot:
+        settings = make_settings(f"autopilot.endpoint={autopilot.address}", "autopilot.on_loss=hold")
+        camera = ScriptedCamera(settings, MonotonicClock(), [picture()], forever=True)
+        service = Service(settings, camera=camera, load_perception=sees_a_wall)
+        service.start()
+        try:
+            wait_until(lambda: service.status().link.connected)
+            with Pilot(autopilot.address) as pilot:
+                pilot.take_off(FLYING_HEIGHT_M)
+                pilot.fly_forward(1.5)
+                wait_until(lambda: autopilot.truth().velocity_ned_mps[0] > 0.8)
+                wait_until(lambda: service.status().mode == flown_in)
+                camera._acts = [CameraError("unplugged")]
+                wait_until(lambda: autopilot.truth().mode == stopped_in)
+                wait_until(lambda: abs(autopilot.truth().velocity_ned_mps[0]) < 0.2)
+                wait_until(lambda: service.status().link.hold is HoldOutcome.GRANTED)
+
+                pilot.set_mode(flown_in)
+                wait_until(lambda: service.status().link.hold is HoldOutcome.OVERRULED)
+                taken_over_s = autopilot.truth().time_s
+                wait_until(lambda: autopilot.truth().time_s > taken_over_s + 1.5)
+                assert autopilot.truth().mode == flown_in
+        finally:
+            service.stop()
