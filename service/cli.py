@@ -42,6 +42,12 @@ COMMANDS = {
     "run": Command("service.run_command", "run", "Fly: camera to depth to OBSTACLE_DISTANCE and Zenoh."),
     "record": Command("service.recorder.command", "record", "Fly, and record the flight."),
     "recover": Command("service.recorder.recover_command", "recover", "Rescue a record that was cut off."),
+    "replay": Command(
+        "service.replay.command", "replay", "Measure a recorded flight again, check its scans."
+    ),
+    "fly-record": Command(
+        "service.replay.fly_record_command", "fly_record", "Make the flights that the tests replay.", "sim"
+    ),
     "watch": Command("service.watch.command", "watch", "Show scan and status of vehicles live."),
     "ground": Command("service.ground.command", "ground", "Serve a page that shows every vehicle live."),
     "doctor": Command(
@@ -60,6 +66,15 @@ COMMANDS = {
         "service.fake_autopilot.command", "fake_autopilot", "Speak MAVLink like ArduPilot or PX4.", "sim"
     ),
     "benchmark": Command("service.benchmark.command", "benchmark", "Measure speed and memory."),
+    "benchmark-stream": Command(
+        "service.benchmark.stream_command",
+        "benchmark_stream",
+        "Measure scans and pictures over a slow radio.",
+        "sim",
+    ),
+    "evaluate-motion": Command(
+        "service.motion_evaluation.command", "evaluate_motion", "Measure metres from motion.", "sim"
+    ),
     "model": Command(
         "service.model_command", "model_app", "Check a depth network and its card.", is_group=True
     ),
@@ -78,6 +93,12 @@ COMMANDS = {
     ),
     "compare": Command(
         "training.comparison.command", "compare_app", "Repeat the paper's comparison.", "train", is_group=True
+    ),
+    "evaluate-flight": Command(
+        "service.flight_evaluation.command",
+        "evaluate_flight",
+        "Measure distances, stops and free ways in rendered flights.",
+        "sim",
     ),
     "evaluate": Command("training.commands", "evaluate", "Measure a depth network's errors.", "train"),
     "export": Command(

@@ -55,5 +55,9 @@ class Footage(Protocol):
     def packets(self) -> Sequence[Packets]:
         """The line's bytes in the order of their times."""
 
+    @property
+    def warnings(self) -> Sequence[str]:
+        """What is wrong and does not keep it from being played."""
+
     def pictures(self) -> Iterator[RecordedPicture]:
         """The pictures in the order of their capture; may be called again."""

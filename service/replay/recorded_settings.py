@@ -1,0 +1,77 @@
+"""The configuration that a record was flown with, as settings of this version."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import structlog
+from pydantic import ValidationError
+
+from service.errors import ConfigError, RecordError
+from service.settings import Settings
+from service.settings.load import describe_problem, load_settings, parse_override
+
+log = structlog.get_logger()
+
+
+def settings_of(
+    configuration: Mapping[str, Any], name: str, config: Path | None = None, overrides: Iterable[str] = ()
+) -> Settings:
+    """The settings to replay with.
+
+    Keys that this version does not know any more are left out and named in the log.
+
+    Args:
+        configuration: sections as they lie in the record.
+        name: the record's, for messages.
+        config: a file whose keys count more than the record's.
+        overrides: `section.key=value` that count most.
+
+    Raises:
+        ConfigError: the file or the overrides are wrong.
+        RecordError: the recorded configuration cannot be used.
+    """
+    table = {section: dict(keys) for section, keys in configuration.items() if isinstance(keys, Mapping)}
+    _without_unknown(table, name)
+    given: dict[str, dict[str, Any]] = {}
+    if config is not None:
+        given = load_settings(config).model_dump(mode="json", exclude_unset=True)
+    for section, keys in given.items():
+        table.setdefault(section, {}).update(keys)
+    for section, key, value in map(parse_override, overrides):
+        table.setdefault(section, {})[key] = value
+        given.setdefault(section, {})[key] = value
+    # A replay listens to nobody and tells nobody unless it is asked to.
+    table.setdefault("zenoh", {}).setdefault("enabled", False)
+    try:
+        return _validated(table)
+    except ValidationError as error:
+        lines = [describe_problem(detail) for detail in error.errors()]
+        text = "\n".join(f"  {line}" for line in lines)
+        if given:
+            raise ConfigError(f"configuration of {name} and the command line:\n{text}") from error
+        raise RecordError(f"configuration in {name}:\n{text}") from error
+
+
+def _validated(table: dict[str, dict[str, Any]]) -> Settings:
+    # By way of JSON, which has lists where settings have tuples.
+    return Settings.model_validate_json(json.dumps(table))
+
+
+def _without_unknown(table: dict[str, dict[str, Any]], name: str) -> None:
+    """Leave out what this version does not know."""
+    try:
+        _validated(table)
+    except ValidationError as error:
+        for detail in error.errors():
+            where = [str(part) for part in detail["loc"]]
+            if detail["type"] != "extra_forbidden":
+                continue
+            if len(where) == 1:
+                table.pop(where[0], None)
+            else:
+                table.get(where[0], {}).pop(where[1], None)
+            log.warning("a recorded key is not known any more", record=name, key=".".join(where))
