@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -81,15 +81,12 @@ class _Track:
             self.errors[each].add(estimate, log_error, wrong, moment.speed_mps, passed_s)
 
 
-def evaluate_journey(
-    journey: Journey, model: DepthModel | None, note: Callable[[str], None] = lambda text: None
-) -> Errors:
+def evaluate_journey(journey: Journey, model: DepthModel | None) -> Errors:
     """Fly one journey.
 
     Args:
         journey: the pictures; those without exact depth everywhere are measured with the network alone.
         model: the network, or None to leave it out.
-        note: is told what goes on.
     """
     motion, tracker = VehicleMotion(), MotionPoints(journey.camera, journey.mount)
     errors, tracks = Errors(), dict[str, _Track]()
@@ -115,7 +112,6 @@ def evaluate_journey(
         for sources, scale_errors in track.errors.items():
             scale_errors.close()
             errors.scales[(track.name, sources)] = scale_errors
-    note(f"{journey.name}: done")
     return errors
 
 
