@@ -41,6 +41,9 @@ class Camera(ABC):
     reopen_on_timeout = True
     """Whether a camera that delivers nothing is worth closing and opening again."""
 
+    has_noise = False
+    """Whether two of its pictures are never the same, so that the same one again means that it hangs."""
+
     stands_back = False
     """Whether its thread computes, so that the flight path goes first where processors are few."""
 

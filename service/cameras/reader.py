@@ -9,6 +9,7 @@ from enum import Enum
 import structlog
 
 from service.cameras.camera import Camera, CameraEndedError, CameraTimeoutError, PictureSizeError
+from service.cameras.freeze_watch import FreezeWatch
 from service.errors import CameraError, ConfigError
 from service.frame import Frame
 from service.latest_slot import LatestSlot
@@ -70,6 +71,7 @@ class CameraReader:
         self._thread = threading.Thread(target=self._run, name="camera", daemon=True)
         self._status = CameraStatus(CameraState.OPENING, "", 0, 0)
         self._reported = ""
+        self._freeze = FreezeWatch()
         self._failure: UavDepthError | None = None
 
     @property
@@ -147,6 +149,11 @@ class CameraReader:
                     raise
                 self._report(str(error), "camera waits")
                 self._show(CameraState.WAITING, str(error))
+                continue
+            if self._camera.has_noise and self._freeze.repeats(frame.image_bgr):
+                words = f"camera {self._camera.name}: delivers the same picture again and again"
+                self._report(words, "camera hangs")
+                self._show(CameraState.WAITING, words)
                 continue
             self._slot.put(frame)
             if self._reported:

@@ -24,6 +24,8 @@ class UsbCamera(Camera):
         device: number of the camera, or its path such as `/dev/video0`.
     """
 
+    has_noise = True
+
     def __init__(self, settings: CameraSettings, clock: Clock, device: int | str) -> None:
         super().__init__(settings, clock)
         self._device = device

@@ -123,6 +123,19 @@ def test_trouble_and_its_end_are_each_said_once() -> None:
     ]
 
 
+def test_the_loss_of_what_protected_the_vehicle_is_told_at_once_and_its_end_when_it_lasts() -> None:
+    announcer = Announcer(settle_ns=100)
+    assert announcer.hear(None, ServiceState.ACTIVE, 0) is None
+    assert announcer.hear(None, ServiceState.ACTIVE, 100) is not None
+    loss = announcer.hear(Trouble.STALLED, ServiceState.CRITICAL, 150)
+    assert loss is not None
+    assert loss.severity == SEVERITY_CRITICAL
+    assert announcer.hear(None, ServiceState.ACTIVE, 200) is None
+    assert announcer.hear(Trouble.STALLED, ServiceState.CRITICAL, 250) is None
+    assert announcer.hear(None, ServiceState.ACTIVE, 300) is None
+    assert announcer.hear(None, ServiceState.ACTIVE, 400) is not None
+
+
 def test_flickering_is_not_announced() -> None:
     announcer = Announcer(settle_ns=100)
     assert announcer.hear(None, ServiceState.ACTIVE, 0) is None

@@ -53,7 +53,7 @@ class Flood:
 
 @pytest.mark.parametrize("bytes_per_s", [2100, 3000, 5000])
 @pytest.mark.parametrize("key", [None, KEY])
-def test_no_second_carries_more_than_the_budget_and_one_burst(
+def test_r22_no_second_carries_more_than_the_budget_and_one_burst(
     bytes_per_s: int, key: SigningKey | None
 ) -> None:
     flood = Flood(20.0, key, bytes_per_s=bytes_per_s)

@@ -16,7 +16,7 @@ MS = 1_000_000
 S = 1_000_000_000
 
 
-def test_boot_time_goes_on_through_the_wrap_of_32_bits() -> None:
+def test_r24_boot_time_goes_on_through_the_wrap_of_32_bits() -> None:
     boot = BootTime()
     raw = 2**32 - 50
     stamps = [boot.unwrap((raw + step) % 2**32, step * MS) for step in range(0, 200, 20)]

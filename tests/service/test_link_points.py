@@ -42,7 +42,7 @@ def points(talk: Conversation, since_ns: int = 0) -> list[mavlink.MAVLink_messag
     return [message for _, message in talk.sent_of("OBSTACLE_DISTANCE_3D", since_ns)]
 
 
-def test_ardupilot_gets_points_and_no_obstacle_distance() -> None:
+def test_r21_ardupilot_gets_points_and_no_obstacle_distance() -> None:
     talk = flying()
     assert offer(talk, wall_scan())
     found = points(talk)

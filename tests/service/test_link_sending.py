@@ -52,14 +52,14 @@ def test_the_capture_time_is_told_on_the_autopilots_clock_once_the_clocks_are_bo
     assert captured_us == pytest.approx((now_ns - 60 * MS) // 1000 + flight.offset_ms * 1000, abs=3000)
 
 
-def test_a_frame_older_than_300_ms_never_leaves() -> None:
+def test_r8_a_frame_older_than_300_ms_never_leaves() -> None:
     talk, _ = connected()
     assert not offer(talk, talk.now_ns - 301 * MS)
     assert offer(talk, talk.now_ns - 299 * MS)
     assert talk.session.status(talk.now_ns).refused_obstacles == {"too_old": 1}
 
 
-def test_a_scan_that_grew_old_while_it_waited_does_not_leave() -> None:
+def test_r8_a_scan_that_grew_old_while_it_waited_does_not_leave() -> None:
     talk, _ = connected()
     assert talk.session.send_obstacles(clear_scan(), talk.now_ns - 200 * MS, talk.now_ns)
     assert talk.session.take_output(talk.now_ns + 150 * MS) == []
@@ -130,7 +130,7 @@ def test_the_first_obstacles_may_leave_within_a_moment_of_the_first_heartbeat() 
     assert talk.sent_of("OBSTACLE_DISTANCE")
 
 
-def test_heartbeats_go_out_once_a_second_as_an_onboard_controller() -> None:
+def test_r18_heartbeats_go_out_once_a_second_as_an_onboard_controller() -> None:
     talk = Conversation(S)
     Flight(talk, Voice(3)).fly(20.0)
     times, beats = zip(*talk.sent_of("HEARTBEAT"), strict=True)

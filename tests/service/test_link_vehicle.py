@@ -10,7 +10,7 @@ S = 1_000_000_000
 
 
 @pytest.mark.parametrize("system_id", [1, 2, 42, 255])
-def test_the_system_id_is_learnt_and_used(system_id: int) -> None:
+def test_r18_the_system_id_is_learnt_and_used(system_id: int) -> None:
     talk = Conversation(S)
     Flight(talk, Voice(system_id)).fly(1.0)
     assert talk.session.status(talk.now_ns).system_id == system_id
@@ -134,7 +134,7 @@ def test_a_silent_autopilot_is_told_once_and_no_obstacle_leaves() -> None:
     assert talk.sent_of("COMMAND_LONG") == []
 
 
-def test_mavlink_1_is_told_once_answered_with_mavlink_2_and_taken_back() -> None:
+def test_r15_mavlink_1_is_told_once_answered_with_mavlink_2_and_taken_back() -> None:
     talk, voice = Conversation(S), Voice(1)
     for _ in range(5):
         talk.hear(voice.heartbeat(mavlink1=True))

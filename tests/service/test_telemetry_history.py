@@ -198,7 +198,7 @@ def test_one_downward_sensor_is_kept_to_until_it_is_silent() -> None:
     assert heights(talk, flight, centimetres=300, sensor_id=5) == pytest.approx(3.0)
 
 
-def test_telemetry_survives_the_wrap_of_the_autopilots_clock() -> None:
+def test_r24_telemetry_survives_the_wrap_of_the_autopilots_clock() -> None:
     talk = Conversation(S)
     flight = Flight(talk, Voice(), offset_ms=2**32 - 3_000)
     flight.yaw_rate = 0.5
