@@ -1,0 +1,1 @@
+"""What the distances are worth in flight: rendered flights against exact truth, open and closed loop."""

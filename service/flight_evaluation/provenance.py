@@ -1,0 +1,23 @@
+"""Of what the figures are: which network, and when."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+from service.flight_evaluation.evaluation import Evaluation
+from service.flight_evaluation.sight import DepthKind
+from uavdepth.depth_model import DepthModel
+
+
+def today() -> str:
+    """Date of the run."""
+    return datetime.now(UTC).date().isoformat()
+
+
+def model_name(evaluation: Evaluation) -> str:
+    """The network by its card, with the day it was made; "true depth" where none was flown."""
+    if DepthKind.NETWORK not in evaluation.plan.kinds:
+        return "true depth"
+    card = DepthModel.load(evaluation.settings.model.path, "cpu", 1).card
+    hints = f", hints {' and '.join(card.hints)}" if card.hints else ", no hints"
+    return f"{card.name} of {card.created}{hints}"
