@@ -1,8 +1,9 @@
 """How many bytes of pictures a second the link takes: found from what the ground reports as received.
 
 Slow growth and quick retreat on delay, as congestion controls do it that must leave room for others (LEDBAT,
-RFC 6817), with the plateau of CUBIC (RFC 9438) below the rate that was too much last. The delay is measured
-on the vehicle's clock alone.
+RFC 6817). A queue is one that stands: the shortest of several delays tells it from a busy processor (CoDel,
+RFC 8289). Below the rate that was too much last, growth waits for a while (CUBIC, RFC 9438). The delay is
+measured on the vehicle's clock alone.
 """
 
 from __future__ import annotations
@@ -30,11 +31,20 @@ _LOW_NS: Final = 50_000_000
 """Waiting below which the budget grows."""
 
 _GROWTH: Final = 0.06
-_PROBING: Final = 0.004
-"""Growth with each report, below and near the rate that was too much last."""
+"""With each report."""
+
+_CAREFUL_GROWTH: Final = 0.004
+_CAREFUL_NS: Final = 8_000_000_000
+"""Growth near the rate that was too much last, and for how long after that."""
 
 _NEAR: Final = 0.9
 _RETREAT: Final = 0.85
+_DEEPEST: Final = 0.7
+"""Least of the budget that one retreat believes to have arrived: one report counts few pictures."""
+
+_STANDING: Final = 2
+"""Reports in a row that must tell of waiting."""
+
 _BASE_WINDOW_NS: Final = 20_000_000_000
 _MAX_SENT = 256
 _MAX_STATIONS = 8
@@ -60,7 +70,7 @@ class PictureBudget:
         self._last_report_ns: int | None = None
         self._shrunk_ns: int | None = None
         self._delays: deque[tuple[int, int]] = deque()
-        self._stations: OrderedDict[str, int] = OrderedDict()
+        self._stations: OrderedDict[str, deque[int]] = OrderedDict()
 
     def sent(self, topic: str, index: int, now_ns: int) -> None:
         """A picture was handed to the link."""
@@ -82,25 +92,28 @@ class PictureBudget:
         sent_ns = self._sent.get((report.topic, report.index))
         if sent_ns is None:
             return
-        self._stations[report.station] = now_ns
+        waits = self._stations.setdefault(report.station, deque(maxlen=_STANDING))
         self._stations.move_to_end(report.station)
         while len(self._stations) > _MAX_STATIONS:
             self._stations.popitem(last=False)
         self._last_report_ns = now_ns
         delay_ns = max(0, now_ns - sent_ns - round(report.age_ms * 1e6))
         self.delay_ms = delay_ns / 1e6
-        waiting_ns = delay_ns - self._base_ns(delay_ns, now_ns)
-        if waiting_ns > _HIGH_NS:
-            # One retreat for each delay: what was sent after the last must first be seen to arrive.
-            if self._shrunk_ns is None or sent_ns > self._shrunk_ns:
-                arrived = 1e3 * report.size_bytes / max(report.interval_ms, 100.0)
-                self._too_much = min(self.bytes_per_s, max(arrived, 0.5 * self.bytes_per_s))
-                self._shrunk_ns = now_ns
-                self._set(_RETREAT * self._too_much)
-        elif waiting_ns < _LOW_NS and wants_more:
-            near = self._too_much is not None and self.bytes_per_s > _NEAR * self._too_much
+        waits.append(delay_ns - self._base_ns(delay_ns, now_ns))
+        if len(waits) == _STANDING and min(waits) > _HIGH_NS:
+            waits.clear()
+            arrived = 1e3 * report.size_bytes / max(report.interval_ms, 100.0)
+            self._too_much = min(self.bytes_per_s, max(arrived, _DEEPEST * self.bytes_per_s))
+            self._shrunk_ns = now_ns
+            self._set(_RETREAT * self._too_much)
+        elif waits[-1] < _LOW_NS and wants_more:
             # Each of several stations reports: together they must not grow faster than one.
-            self._set(self.bytes_per_s * (1 + (_PROBING if near else _GROWTH) / len(self._stations)))
+            self._set(self.bytes_per_s * (1 + self._growth(now_ns) / len(self._stations)))
+
+    def _growth(self, now_ns: int) -> float:
+        if self._too_much is None or self._shrunk_ns is None or now_ns - self._shrunk_ns > _CAREFUL_NS:
+            return _GROWTH
+        return _CAREFUL_GROWTH if self.bytes_per_s > _NEAR * self._too_much else _GROWTH
 
     def tick(self, now_ns: int) -> None:
         """Notice reports that do not come."""
