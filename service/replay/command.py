@@ -87,8 +87,6 @@ def replay(
     passed = True
     for files in flights:
         flight = open_flight(files, config, given, fps=fps, offset_s=offset)
-        for warning in flight.footage.warnings:
-            typer.echo(f"warning: {warning}", err=True)
         goldens = _golden_path(flight, check) if check is not None or update else None
         old = _old_golden(goldens, update=update, force=force) if goldens is not None else None
         begun_s = time.monotonic()
@@ -96,6 +94,8 @@ def replay(
         if realtime or autopilot is not None or zenoh:
             played = _shown(flight, played, autopilot=autopilot is not None, zenoh=zenoh)
         results = [_slim(one) for one in played]
+        for warning in flight.footage.warnings:
+            typer.echo(f"warning: {warning}", err=True)
         _tell(flight, results, time.monotonic() - begun_s)
         if goldens is not None:
             passed &= _hold_against(goldens, old, flight, results, update=update, picture=picture)

@@ -95,7 +95,7 @@ def open_flight(
     """
     if files[0].suffix.lower() == RECORD_SUFFIX:
         recording = Recording(files)
-        settings = settings_of(recording.configuration, recording.name, config, overrides)
+        settings = settings_of(recording.configuration, recording.name, config, overrides, recording.warnings)
         return Flight(_stem(files[0]), recording, settings)
     from service.replay.loose_footage import LooseFootage
 

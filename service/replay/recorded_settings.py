@@ -7,35 +7,39 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-import structlog
 from pydantic import ValidationError
 
 from service.errors import ConfigError, RecordError
 from service.settings import Settings
 from service.settings.load import describe_problem, load_settings, parse_override
 
-log = structlog.get_logger()
-
 
 def settings_of(
-    configuration: Mapping[str, Any], name: str, config: Path | None = None, overrides: Iterable[str] = ()
+    configuration: Mapping[str, Any],
+    name: str,
+    config: Path | None = None,
+    overrides: Iterable[str] = (),
+    warnings: list[str] | None = None,
 ) -> Settings:
     """The settings to replay with.
 
-    Keys that this version does not know any more are left out and named in the log.
+    Keys that this version does not know any more are left out.
 
     Args:
         configuration: sections as they lie in the record.
         name: the record's, for messages.
         config: a file whose keys count more than the record's.
         overrides: `section.key=value` that count most.
+        warnings: gets the keys that were left out, in words.
 
     Raises:
         ConfigError: the file or the overrides are wrong.
         RecordError: the recorded configuration cannot be used.
     """
     table = {section: dict(keys) for section, keys in configuration.items() if isinstance(keys, Mapping)}
-    _without_unknown(table, name)
+    left_out = _without_unknown(table)
+    if warnings is not None:
+        warnings += [f"{name}: recorded key {key} is not known any more: left out" for key in left_out]
     given: dict[str, dict[str, Any]] = {}
     if config is not None:
         given = load_settings(config).model_dump(mode="json", exclude_unset=True)
@@ -61,8 +65,9 @@ def _validated(table: dict[str, dict[str, Any]]) -> Settings:
     return Settings.model_validate_json(json.dumps(table))
 
 
-def _without_unknown(table: dict[str, dict[str, Any]], name: str) -> None:
-    """Leave out what this version does not know."""
+def _without_unknown(table: dict[str, dict[str, Any]]) -> list[str]:
+    """Leave out what this version does not know; returns its keys."""
+    left_out: list[str] = []
     try:
         _validated(table)
     except ValidationError as error:
@@ -74,4 +79,5 @@ def _without_unknown(table: dict[str, dict[str, Any]], name: str) -> None:
                 table.pop(where[0], None)
             else:
                 table.get(where[0], {}).pop(where[1], None)
-            log.warning("a recorded key is not known any more", record=name, key=".".join(where))
+            left_out.append(".".join(where))
+    return left_out

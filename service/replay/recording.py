@@ -9,7 +9,6 @@ from typing import Any
 
 import cv2
 import numpy as np
-import structlog
 from mcap.records import Attachment, Channel, Message, Metadata
 from numpy.typing import NDArray
 
@@ -19,8 +18,6 @@ from service.recorder.perception_note import PerceptionNote
 from service.recorder.record_reader import RecordReader
 from service.replay.footage import Packets, RecordedPicture
 from service.replay.protobuf_fields import protobuf_fields
-
-log = structlog.get_logger()
 
 _MAX_PIXELS = 4096 * 4096
 _MAX_CONFIGURATION_BYTES = 1_000_000
@@ -165,7 +162,7 @@ class Recording:
             except RecordError as error:
                 damaged += 1
                 if damaged == 1:
-                    log.warning("a damaged picture is left out", file=str(path), problem=str(error))
+                    self.warnings.append(f"{path}: damaged pictures are left out ({error})")
         if note is not None:
             yield RecordedPicture(note, image, depth_m)
 
