@@ -23,7 +23,7 @@ class TransportDelay:
     """
 
     def __init__(self, endpoint: str) -> None:
-        line = parse_endpoint(endpoint)
+        line = parse_endpoint(endpoint) if endpoint.startswith("serial:") else None
         bytes_per_s = line.baud / _BITS_PER_BYTE if isinstance(line, SerialEndpoint) else 0.0
         self._message_ns = round(OBSTACLE_BYTES / bytes_per_s * 1e9) if bytes_per_s else 0
         self._trips_ns: deque[int] = deque(maxlen=_KEPT)
