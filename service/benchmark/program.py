@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 import time
 from contextlib import ExitStack
@@ -34,8 +35,12 @@ class ProgramFigures:
         first_message_s: from the start of the process to the first OBSTACLE_DISTANCE; the vehicle is in
             the air, so that only trusted distances are sent.
         obstacle_rate_hz: OBSTACLE_DISTANCE as received over the rest of the run.
-        frames_per_s, latency_ms_p50, latency_ms_p95: as the program reports them.
+        frames_per_s: measured by the program; 15 are offered.
+        latency_ms_p50, latency_ms_p95: from a picture's due time to its message on the line, as the program
+            reports it: decoding, network and waiting count.
         peak_memory_mib: largest resident memory (VmHWM).
+        load_before: programs that wanted the processors in the minute before. Near 0 on a quiet machine; the
+            other figures hold for the load that they were taken under.
     """
 
     first_message_s: float
@@ -44,6 +49,7 @@ class ProgramFigures:
     latency_ms_p50: float | None
     latency_ms_p95: float | None
     peak_memory_mib: float
+    load_before: float
 
 
 def measure_program(model: str, pictures: list[NDArray[np.uint8]], seconds: float) -> ProgramFigures:
@@ -52,6 +58,7 @@ def measure_program(model: str, pictures: list[NDArray[np.uint8]], seconds: floa
     Raises:
         UavDepthError: no message comes within 30 s, or the program ends by itself.
     """
+    load_before = os.getloadavg()[0]
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="uavdepth-benchmark-")))
         pictures_folder = folder / "pictures"
@@ -89,6 +96,7 @@ def measure_program(model: str, pictures: list[NDArray[np.uint8]], seconds: floa
             latency_ms_p50=None if status is None else status.latency_ms_p50,
             latency_ms_p95=None if status is None else status.latency_ms_p95,
             peak_memory_mib=companion.peak_memory_mib,
+            load_before=round(load_before, 1),
         )
 
 
