@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from service.motion_evaluation.depth_errors import abs_rel, log_scale
 from service.motion_evaluation.journey import Journey, Moment
 from service.motion_evaluation.point_errors import PointErrors
-from service.motion_evaluation.scale_errors import ScaleErrors
+from service.motion_evaluation.scale_errors import SETTLED_S, SHORT_DRIVE_S, ScaleErrors
 from service.motion_evaluation.unitless import UNIT_M, UnitlessTruth
 from uavdepth.depth_map import DepthMap
 from uavdepth.depth_model import DepthModel
@@ -24,6 +24,9 @@ from uavdepth.vehicle_motion import VehicleMotion
 
 SourceSet = Literal["points", "ground", "both"]
 SOURCE_SETS: tuple[SourceSet, ...] = ("both", "points", "ground")
+FLOWN = ("flight", "recorded")
+"""Groups of journeys with exact depth and a rangefinder."""
+
 DepthName = Literal["network", "truth relative", "truth affine"]
 
 _LEAST_POINTS = 8
@@ -40,7 +43,7 @@ class Errors:
         unhinted: the same without any hint.
         held_out: where nothing else is known: Abs Rel of the network that got every second point, at the
             others, picture by picture.
-        scales: of the estimator, by depth and sources.
+        scales: of the estimator, by depth and sources; where nothing else is known against held-out points.
     """
 
     points: PointErrors = field(default_factory=PointErrors)
@@ -56,7 +59,7 @@ class Errors:
         self.unhinted += other.unhinted
         self.held_out += other.held_out
         for key, errors in other.scales.items():
-            self.scales.setdefault(key, ScaleErrors()).join(errors)
+            self.scales.setdefault(key, ScaleErrors(errors.settled_s)).join(errors)
 
 
 class _Track:
@@ -66,16 +69,21 @@ class _Track:
         kind: Literal["relative", "affine"] = "affine" if name == "truth affine" else "relative"
         self.name = name
         self._estimators = {each: ScaleEstimator(journey.camera, journey.mount, kind) for each in sets}
-        self.errors: dict[SourceSet, ScaleErrors] = {each: ScaleErrors() for each in self._estimators}
+        self.errors: dict[SourceSet, ScaleErrors] = {
+            each: ScaleErrors(SETTLED_S if journey.group in FLOWN else SHORT_DRIVE_S)
+            for each in self._estimators
+        }
 
     def add(self, depth: DepthMap, moment: Moment, points: PointHints, passed_s: float) -> None:
+        told = points if moment.truth_m is not None else _every_second(points, 0)
         for each, estimator in self._estimators.items():
             ground = None if each == "points" else moment.ground
-            estimate = estimator.update(depth, ground, None if each == "ground" else points, moment.at_ns)
-            if moment.truth_m is None:
-                continue
+            estimate = estimator.update(depth, ground, None if each == "ground" else told, moment.at_ns)
             log_error, wrong = math.nan, math.nan
-            if estimate is not None:
+            if estimate is not None and moment.truth_m is None:
+                metres, others = apply(estimate, depth).depth_m, _every_second(points, 1)
+                log_error, wrong = _log_scale_at(metres, others), _at_points(metres, others)
+            elif estimate is not None and moment.truth_m is not None:
                 metres = apply(estimate, depth).depth_m
                 log_error, wrong = log_scale(metres, moment.truth_m), abs_rel(metres, moment.truth_m)
             self.errors[each].add(estimate, log_error, wrong, moment.speed_mps, passed_s)
@@ -103,7 +111,7 @@ def evaluate_journey(journey: Journey, model: DepthModel | None) -> Errors:
             for kind, maker in unitless.items():
                 name: DepthName = "truth relative" if kind == "relative" else "truth affine"
                 depths[name] = maker.of(moment.truth_m, passed_s)
-        sets: tuple[SourceSet, ...] = SOURCE_SETS if journey.group in ("flight", "recorded") else ("points",)
+        sets: tuple[SourceSet, ...] = SOURCE_SETS if journey.group in FLOWN else ("points",)
         for each, depth in depths.items():
             if each not in tracks:
                 tracks[each] = _Track(each, journey, sets)
@@ -152,6 +160,16 @@ def _network(
 
 def _every_second(points: PointHints, first: int) -> PointHints:
     return PointHints(points.pixels[first::2], points.depth_m[first::2], points.relative_sigma[first::2])
+
+
+def _log_scale_at(depth_m: NDArray[np.float32], points: PointHints) -> float:
+    """Log of the median of depth over the points'."""
+    if len(points) < _LEAST_POINTS:
+        return math.nan
+    column, row = np.rint(points.pixels).astype(int).T
+    found = depth_m[row, column]
+    known = np.isfinite(found) & (found > 0)
+    return float(np.median(np.log(found[known] / points.depth_m[known]))) if known.any() else math.nan
 
 
 def _at_points(depth_m: NDArray[np.float32], points: PointHints) -> float:

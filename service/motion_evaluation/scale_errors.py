@@ -13,6 +13,9 @@ MOVING_MPS = 1.0
 SETTLED_S = 3.0
 """From so many seconds of motion on the scale has to be right."""
 
+SHORT_DRIVE_S = 0.5
+"""The same for drives that are hardly longer than that."""
+
 LARGEST_SIGMA = 0.25
 LARGEST_AGE_S = 2.0
 """The gate of the service: beyond either everything is unknown."""
@@ -25,7 +28,7 @@ class ScaleSummary:
     """The scale along one or several journeys, of the pictures whose estimate passes the gate.
 
     Args:
-        pictures: with at least `SETTLED_S` of motion behind them.
+        pictures: with so much motion behind them that the scale has to be right.
         trusted: share of them that pass the gate.
         median, p95: of the relative error of the scale of those.
         bias: median signed error.
@@ -58,8 +61,13 @@ class _Row:
 
 @dataclass
 class ScaleErrors:
-    """Collects them picture by picture; one journey at a time, `join` puts several together."""
+    """Collects them picture by picture; one journey at a time, `join` puts several together.
 
+    Args:
+        settled_s: motion after which the scale has to be right, seconds.
+    """
+
+    settled_s: float = SETTLED_S
     _rows: list[_Row] = field(default_factory=list)
     _moved_s: float = 0.0
     _converged: list[float | None] = field(default_factory=list)
@@ -90,7 +98,7 @@ class ScaleErrors:
                 break
             moved_s = row.moved_s
         # A last picture with a wrong scale is one of the 5 % at most, not a scale that never converged.
-        if moved_s is None or moved_s > SETTLED_S:
+        if moved_s is None or moved_s > self.settled_s:
             moved_s = self._first_lasting()
         self._converged.append(moved_s)
 
@@ -109,8 +117,8 @@ class ScaleErrors:
 
     def summary(self) -> ScaleSummary | None:
         """None where the vehicle never moved long enough."""
-        late = [row for row in self._rows if row.moved_s >= SETTLED_S]
-        early = [abs(row.error) for row in self._rows if row.moved_s < SETTLED_S and row.trusted]
+        late = [row for row in self._rows if row.moved_s >= self.settled_s]
+        early = [abs(row.error) for row in self._rows if row.moved_s < self.settled_s and row.trusted]
         trusted = [row for row in late if row.trusted]
         if not late:
             return None
