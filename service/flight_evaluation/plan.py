@@ -44,8 +44,12 @@ class EvaluationPlan:
         self, approaches: int | None = None, corridors: int | None = None, poses: int | None = None
     ) -> EvaluationPlan:
         """The same with other numbers; None leaves a number as it is."""
-        wanted = {"approaches": approaches, "corridors": corridors, "poses": poses}
-        return replace(self, **{name: number for name, number in wanted.items() if number is not None})
+        return replace(
+            self,
+            approaches=self.approaches if approaches is None else approaches,
+            corridors=self.corridors if corridors is None else corridors,
+            poses=self.poses if poses is None else poses,
+        )
 
     def shared(self, total: int) -> tuple[int, ...]:
         """A number spread over the scenes as evenly as it goes."""

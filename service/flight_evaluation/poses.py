@@ -16,9 +16,10 @@ from uavdepth.scenes.flight import Pose
 
 _HEIGHT_M = (1.5, 8.0)
 _CLEARANCE_M = 1.0
-_TRIES = 10_000
+_TRIES = 2_000
 _FACING_SHARE = 0.7
 _FACING_M = (2.0, 20.0)
+_FACING_TRIES = 200
 _TILT_RAD = math.radians(7.0)
 _LARGEST_TILT_RAD = math.radians(25.0)
 
@@ -63,14 +64,14 @@ def random_pose(scene: Scene, rng: np.random.Generator) -> Pose:
     """
     reach_m = 0.9 * scene.extent_m
     faces_something = rng.random() < _FACING_SHARE
-    for _ in range(_TRIES):
+    for number in range(_TRIES):
         north_m, east_m = rng.uniform(-reach_m, reach_m, 2)
         up_m = scene.ground_height_m(north_m, east_m) + rng.uniform(*_HEIGHT_M)
         position = np.array([north_m, east_m, -up_m])
         yaw = float(rng.uniform(-math.pi, math.pi))
         heading = np.array([math.cos(yaw), math.sin(yaw), 0.0])
         ahead_m = float(scene.ray_distance_m(position, heading)[0])
-        if faces_something and not _FACING_M[0] <= ahead_m <= _FACING_M[1]:
+        if faces_something and number < _FACING_TRIES and not _FACING_M[0] <= ahead_m <= _FACING_M[1]:
             continue
         below_m = scene.rangefinder_m(position.tolist())
         if below_m is None or scene.clearance_m(position.tolist()) < _CLEARANCE_M:

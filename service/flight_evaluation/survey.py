@@ -86,7 +86,7 @@ class Surveyor:
         eyes = Eyes(self._settings, self._kind)
         for number in range(count):
             pose = random_pose(self._scene, rng)
-            seen = self._see(eyes, lambda _t_s, pose=pose: pose, number * _POSE_GAP_S, number)
+            seen = self._see(eyes, _staying(pose), number * _POSE_GAP_S, number)
             yield self._judged(seen, None, 0.0)
 
     def flight(self, trajectory: Trajectory) -> Iterator[Looked]:
@@ -145,6 +145,10 @@ class Surveyor:
                 f"nothing below {pose.position_ned_m} in {self._world.name}:{self._world.seed}"
             )
         return height_m
+
+
+def _staying(pose: Pose) -> Callable[[float], Pose]:
+    return lambda _t_s: pose
 
 
 def _scale_error(result: PerceptionResult, depth_m: NDArray[np.float32]) -> float | None:

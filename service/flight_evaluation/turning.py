@@ -116,7 +116,7 @@ def _outline(
     origins = np.stack([np.full_like(down, north_m), np.full_like(down, east_m), down], axis=1)
     directions = np.stack([np.cos(bearing), np.sin(bearing), np.zeros_like(bearing)], axis=1)
     reach = scene.ray_distance_m(origins, directions).reshape(len(downs), len(bearings))
-    return np.minimum(reach.min(axis=0, initial=math.inf), most_m)
+    return np.asarray(np.minimum(reach.min(axis=0, initial=math.inf), most_m))
 
 
 def _elements_of(outline: NDArray[np.float64], bearings_deg: NDArray[np.float64]) -> NDArray[np.float64]:
