@@ -6,6 +6,7 @@ export class FleetList {
   #items = new Map(); // name -> elements
   #vehicles = [];
   #selected = null;
+  #isInView = false;
 
   /** @param {(name: string) => void} onSelect called when the user chooses a vehicle. */
   constructor(list, onSelect) {
@@ -49,16 +50,11 @@ export class FleetList {
     this.#markSelected();
   }
 
-  /** Show again which vehicle is selected, after it may have come. */
-  mark() {
-    this.#markSelected();
-  }
-
   /** Show which vehicle is selected. */
   select(name) {
     this.#selected = name;
+    this.#isInView = false;
     this.#markSelected();
-    this.#items.get(name)?.root.scrollIntoView({ block: "nearest", inline: "nearest" });
   }
 
   /** Draw ages as of now. */
@@ -84,7 +80,12 @@ export class FleetList {
   #markSelected() {
     for (const [name, item] of this.#items) {
       item.root.setAttribute("aria-selected", String(name === this.#selected));
-      if (name === this.#selected) this.list.setAttribute("aria-activedescendant", item.root.id);
+      if (name !== this.#selected) continue;
+      this.list.setAttribute("aria-activedescendant", item.root.id);
+      if (!this.#isInView) {
+        this.#isInView = true;
+        item.root.scrollIntoView({ block: "nearest", inline: "nearest" });
+      }
     }
   }
 

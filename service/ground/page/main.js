@@ -84,8 +84,6 @@ function hearFleet(document, bornOf) {
   if (selected === null && document.vehicles.length > 0) {
     const isLive = (vehicle) => isNumber(vehicle.age_ms) && vehicle.age_ms <= limits.staleMs;
     select((document.vehicles.find(isLive) ?? document.vehicles[0]).name);
-  } else {
-    list.mark();
   }
 }
 

@@ -118,7 +118,12 @@ export class VehiclePanel {
     if (this.#detail !== null && !this.#detail.alive) notes.push("its session is gone");
     if (scan !== null && !scan.trusted) notes.push(`no distances: ${scan.trouble ?? "not trusted"}`);
     else if (status?.trouble) notes.push(status.trouble);
-    for (const words of [status?.link_detail, status?.camera_detail, status?.recording_detail]) {
+    for (const words of [
+      status?.link_detail,
+      status?.camera_detail,
+      status?.recording_detail,
+      status?.scale_suspicion,
+    ]) {
       if (words) notes.push(words);
     }
     const trouble = byId("trouble");
