@@ -36,6 +36,8 @@ log = structlog.get_logger()
 
 ALL_HINTS = ("ground", "points")
 
+SUSPICION_TEXT = "uavdepth: metres doubtful, check focal length"
+
 
 class Scanner(Protocol):
     """What makes a scan of metric depth."""
@@ -79,6 +81,7 @@ class Perception:
         self._scanner = scanner
         self._memory = ScanMemory(settings.scan.memory_s)
         self._mount_watch = MountWatch(settings, self._metres.without_hints)
+        self._has_told_suspicion = False
         self._model_failures = 0
         self.model_card: ModelCard | None = None
         """The network's card; None for a source of depth that has none."""
@@ -161,15 +164,20 @@ class Perception:
             self._memory.clear()
         return result
 
-    def look_at_mount(self, result: PerceptionResult) -> str | None:
-        """Hold the mount against the ground, if it is time to; to be called when a result has been sent.
+    def remark(self, result: PerceptionResult) -> str | None:
+        """What seems to be configured wrong; to be called when a result has been sent.
 
-        Now and then it runs the network once more, so the next picture may be late.
+        Now and then it runs the network once more to look at the mount, so the next picture may be late.
 
         Returns:
-            A text of at most 50 characters for the pilot, once, where the mount seems wrong.
+            A text of at most 50 characters for the pilot, once for each thing.
         """
-        return self._mount_watch.look(result.frame, result.telemetry)
+        suspicion = None if result.scale is None else result.scale.suspicion
+        if suspicion is not None and not self._has_told_suspicion:
+            self._has_told_suspicion = True
+            log.warning(suspicion)
+            return SUSPICION_TEXT
+        return None if result.depth is None else self._mount_watch.look(result.frame, result.telemetry)
 
     def _scan(self, blank: PerceptionResult, measured: Measurement) -> PerceptionResult:
         depth, attitude = measured.depth, measured.telemetry.attitude

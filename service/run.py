@@ -262,9 +262,9 @@ class Service:
         if self._recorder is not None:
             self._recorder.offer(result, begun_ns, done_ns)
         self._hand_out(result)
-        mount = perception.look_at_mount(result)
-        if mount is not None:
-            self._link.say(SEVERITY_WARNING, mount)
+        remark = perception.remark(result)
+        if remark is not None:
+            self._link.say(SEVERITY_WARNING, remark)
 
     def _stands_ready(self, result: PerceptionResult) -> bool:
         """Whether all is well but the vehicle stands: disarmed, and too low to tell the scale.

@@ -17,7 +17,7 @@ class MotionSettings(Section):
         default=True,
         title="Measure points",
         description="Follows corners from picture to picture and measures their distance by the way that the "
-        "vehicle went; takes about 6 ms of one core a picture. They give metres, together with the height or "
+        "vehicle went; takes 6 to 9 ms of one core a picture. They give metres, together with the height or "
         "instead of it, while the vehicle moves and for 2 s after it has stopped.",
     )
     attitude_sigma_deg: float = Field(

@@ -13,7 +13,7 @@ from program_fakes import FLYING_HEIGHT_M, LEVEL, FixedDepth, make_settings, pic
 
 from service.errors import ConfigError
 from service.frame import Frame
-from service.pipeline import Perception, make_scanner, unknown_scan
+from service.pipeline import SUSPICION_TEXT, Perception, make_scanner, unknown_scan
 from service.telemetry import Telemetry
 from service.trouble import Trouble
 from uavdepth.attitude import Attitude
@@ -251,6 +251,33 @@ def test_a_result_that_came_too_late_is_taken_back() -> None:
     assert not late.trusted
     assert np.all(late.scan.state == SectorState.UNKNOWN)
     assert late.scan.max_distance_m == result.scan.max_distance_m
+
+
+def test_a_contradiction_of_the_sources_is_told_once() -> None:
+    result = perception_of(FixedDepth(shrunk(wall_over_ground(CAMERA, 8.0)))).step(frame_at(0.0), FLYING)
+    assert result.scale is not None
+    doubtful = replace(result, scale=replace(result.scale, suspicion="metres are 20 % off"))
+    perception = perception_of(FixedDepth(shrunk(wall_over_ground(CAMERA, 8.0))))
+    assert perception.remark(result) is None
+    assert perception.remark(doubtful) == SUSPICION_TEXT
+    assert perception.remark(doubtful) is None
+    assert len(SUSPICION_TEXT) <= 50
+
+
+def test_inverse_depth_up_to_scale_and_shift_flies_from_a_file(tmp_path: Path) -> None:
+    path = Path(__file__).parents[1] / "data" / "depth_anything_tiny.onnx"
+    card = tmp_path / "card.toml"
+    card.write_text(
+        'card_version = 2\nname = "anything"\ninput_width = 70\ninput_height = 42\nmultiple_of = 14\n'
+        'mean = [0, 0, 0]\nstd = [1, 1, 1]\noutput = "affine_inverse_depth"\n'
+        'input_name = "pixel_values"\noutput_name = "predicted_depth"\n'
+    )
+    settings = make_settings(f"model.path={path}", f"model.card={card}", "model.provider=cpu")
+    perception = Perception.load(settings)
+    result = perception.step(frame_at(0.0), FLYING)
+    # Its weights are random, so what it says of a grey picture is nothing; but it is asked, and not refused.
+    assert perception.model_failures == 0
+    assert not result.trusted or result.scale is not None
 
 
 def test_live_and_replay_agree() -> None:
