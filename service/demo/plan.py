@@ -9,6 +9,7 @@ from pathlib import Path
 from service.fake_autopilot.autopilot import Flavor
 
 VEHICLE = "demo"
+_VIEWERS_PORT = 7447
 MARGIN_M = 4.0
 """AVOID_MARGIN and CP_DIST of the demo's vehicle, metres."""
 
@@ -88,9 +89,12 @@ listen = ["{zenoh_endpoint}"]
 
 
 def free_zenoh_endpoint() -> str:
-    """A loopback endpoint whose port nobody uses now."""
+    """A loopback endpoint whose port nobody uses now: where viewers look by default, if that is free."""
     with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
+        try:
+            probe.bind(("127.0.0.1", _VIEWERS_PORT))
+        except OSError:
+            probe.bind(("127.0.0.1", 0))
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
