@@ -33,6 +33,7 @@ _BROKEN = (
     OverflowError,
     MemoryError,
     RecursionError,
+    OSError,
 )
 
 
