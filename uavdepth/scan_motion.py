@@ -144,18 +144,28 @@ def _nearest_of_arcs(
 
 def _still_clear(scan: ObstacleScan, turned_deg: float, way: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(72,) elements in which everything that they cross of the old scan was clear."""
-    edge = SECTOR_WIDTH_DEG / 2 - _OVERLAP_DEG
-    across = np.linspace(-edge, edge, _PIECES)
-    bearings = sector_bearings_deg().astype(np.float64)[:, None] + across + turned_deg
-    nearest = min(max(_NEAREST_WAYS * float(np.hypot(*way)), scan.min_distance_m), 0.99 * scan.max_distance_m)
-    ranges = 1.0 / np.linspace(1.0 / nearest, 1.0 / scan.max_distance_m, _RANGES)
-    points = way + ranges[:, None] * _unit(bearings)[:, :, None, :]
-    element = np.floor(_element(_bearing_deg(points)) + 0.5).astype(np.intp) % SECTOR_COUNT
     clear = scan.state == SectorState.CLEAR
+    bearings = sector_bearings_deg().astype(np.float64)[:, None] + turned_deg
+    farthest = way + scan.max_distance_m * _unit(bearings)
+    perhaps = np.asarray(clear[_element_of(farthest)][:, 0], dtype=np.bool_)
+    if not perhaps.any():
+        return perhaps
+    edge = SECTOR_WIDTH_DEG / 2 - _OVERLAP_DEG
+    across = bearings[perhaps] + np.linspace(-edge, edge, _PIECES)
+    nearest = min(max(_NEAREST_WAYS * float(np.hypot(*way)), scan.min_distance_m), 0.99 * scan.max_distance_m)
+    ranges = 1.0 / np.linspace(1.0 / scan.max_distance_m, 1.0 / nearest, _RANGES if way.any() else 1)
+    points = way + ranges[:, None] * _unit(across)[:, :, None, :]
+    element = _element_of(points)
     # In front of its obstacle an element has been looked at; at it and behind it, nothing is known.
     free_m = np.where(scan.state == SectorState.OBSTACLE, np.nan_to_num(scan.distance_m, nan=0.0), 0.0)
     free = clear[element] | (np.hypot(points[..., 0], points[..., 1]) < free_m[element])
-    return np.asarray(free.all(axis=(1, 2)), dtype=np.bool_)
+    perhaps[perhaps] = free.all(axis=(1, 2))
+    return perhaps
+
+
+def _element_of(points: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Number of the element that holds each of (..., 2) points."""
+    return np.floor(_element(_bearing_deg(points)) + 0.5).astype(np.intp) % SECTOR_COUNT
 
 
 def _unit(bearing_deg: NDArray[np.float64]) -> NDArray[np.float64]:

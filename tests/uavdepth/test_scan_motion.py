@@ -62,6 +62,13 @@ def test_clear_turns_with_the_vehicle_and_what_comes_into_view_is_unknown() -> N
     ]
 
 
+def test_a_direction_that_an_obstacle_reaches_into_is_told_and_none_beside_it_is_lost() -> None:
+    after = turned(scan_with({0.0: 8.0}), 2.0)
+    assert obstacles(after) == [element(-5), element(0)]
+    assert after.state[element(5)] == SectorState.CLEAR
+    assert after.state[element(-10)] == SectorState.CLEAR
+
+
 def test_what_is_ahead_gets_nearer_by_the_way_flown() -> None:
     after = moved_scan(scan_with({0.0: 8.0}), 0.0, (0.6, 0.0))
     assert after.distance_m[element(0)] == pytest.approx(7.4)
