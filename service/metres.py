@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, replace
-from typing import Protocol
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,63 +12,19 @@ from numpy.typing import NDArray
 from service.frame import Frame
 from service.ground_hints import LARGEST_TURN_RAD, GroundHints, KnownGround
 from service.live_hints import LiveHints, sigma_of
+from service.measurement import DepthSource, Measurement, ScaleSource
 from service.scale_status import ScaleStatus
 from service.settings import Settings
 from service.telemetry import Telemetry
 from service.trouble import Trouble
 from service.vehicle_height import VehicleHeight
-from uavdepth.camera import CameraModel
 from uavdepth.depth_map import DepthMap
-from uavdepth.hints import GroundHint, Hints, PointHints
-from uavdepth.scale_estimator import NetworkKind, ScaleEstimate, apply
+from uavdepth.hints import Hints, PointHints
+from uavdepth.scale_estimator import ScaleEstimate, ScaleEstimator, apply
+
+_COMPARED_EVERY_NS = 200_000_000
 
 TelemetryAt = Callable[[int], Telemetry]
-
-
-class DepthSource(Protocol):
-    """What tells depth from a picture, in units of its own, or in metres where it is given hints."""
-
-    def infer(
-        self, image_bgr: NDArray[np.uint8], camera: CameraModel, hints: Hints | None = None
-    ) -> DepthMap:
-        """Depth at the camera's pixels."""
-
-
-class ScaleSource(Protocol):
-    """What finds the metres of a network's depth (`uavdepth.scale_estimator.ScaleEstimator`)."""
-
-    @property
-    def kind(self) -> NetworkKind:
-        """What the network's answer is."""
-
-    def update(
-        self, depth: DepthMap, ground: GroundHint | None, points: PointHints | None, captured_ns: int
-    ) -> ScaleEstimate | None:
-        """The scale of one picture, or None where it was never told."""
-
-    def clear(self) -> None:
-        """Forget everything."""
-
-
-@dataclass(frozen=True)
-class Measurement:
-    """One picture's depth.
-
-    Args:
-        telemetry: the vehicle at capture.
-        depth: in metres; None with trouble.
-        scale: what the metres rest on; None where nothing does.
-        height_m: height above ground by the rangefinder; None where it does not say.
-        points: points that motion measured.
-        trouble: why there are no metres, or none to trust.
-    """
-
-    telemetry: Telemetry
-    depth: DepthMap | None = None
-    scale: ScaleStatus | None = None
-    height_m: float | None = None
-    points: int = 0
-    trouble: Trouble | None = None
 
 
 class Metres:
@@ -105,6 +60,10 @@ class Metres:
         self._ground = GroundHints(mount, height)
         measures_points = scale is not None or "points" in takes
         self._points = LiveHints(camera, mount, settings.motion) if measures_points else None
+        # Nothing is scaled by it: it tells whether ground and points contradict each other.
+        self._second_opinion = None if scale is not None else ScaleEstimator(camera, mount, "metric")
+        self._compared_ns: int | None = None
+        self._suspicion: str | None = None
         self._epoch: int | None = None
         self._measured_ns = 0
 
@@ -154,7 +113,9 @@ class Metres:
         if math.isinf(min(by_ground, by_points)):
             return replace(measured, trouble=ground if isinstance(ground, Trouble) else Trouble.NO_HEIGHT)
         age_s = ground.height.age_s if isinstance(ground, KnownGround) and "points" not in sources else 0.0
-        scale = ScaleStatus(1.0, min(by_ground, by_points), age_s, sources)
+        if len(sources) > 1:
+            self._compare(raw, ground, points, frame.captured_ns)
+        scale = ScaleStatus(1.0, min(by_ground, by_points), age_s, sources, self._suspicion)
         trouble = self._gate(scale, ground)
         if trouble is not None:
             return replace(measured, scale=scale, trouble=trouble)
@@ -167,6 +128,18 @@ class Metres:
         if isinstance(ground, KnownGround) and ground.height.relative_sigma <= self._max_sigma:
             told = ground.hint
         return self._model.infer(frame.image_bgr, self._camera, Hints(told, points))
+
+    def _compare(
+        self, raw: DepthMap, ground: KnownGround | Trouble, points: PointHints | None, captured_ns: int
+    ) -> None:
+        """See now and then whether the ground and the points agree on metres."""
+        if self._second_opinion is None or not isinstance(ground, KnownGround):
+            return
+        if self._compared_ns is not None and 0 <= captured_ns - self._compared_ns < _COMPARED_EVERY_NS:
+            return
+        self._compared_ns = captured_ns
+        estimate = self._second_opinion.update(raw, ground.hint, points, captured_ns)
+        self._suspicion = None if estimate is None else estimate.suspicion
 
     # -- a network that does not
 

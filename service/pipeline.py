@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from service.errors import ConfigError
 from service.frame import Frame
-from service.metres import DepthSource, Measurement, Metres, ScaleSource
+from service.measurement import DepthSource, Measurement, ScaleSource
+from service.metres import Metres
 from service.mount_watch import MountWatch
 from service.network import answers_in_metres, load_network, network_kind
 from service.perception_result import PerceptionResult, unknown_scan

@@ -33,11 +33,15 @@ from uavdepth.errors import (
 )
 from uavdepth.ground_scale import GroundScale, GroundScaler, vertical_height_m
 from uavdepth.hints import GroundHint, Hints, PointHints
+from uavdepth.image_mask import load_image_mask
 from uavdepth.motion_points import MotionPoints, MotionPointSettings
 from uavdepth.obstacle_message import encode_obstacle_distance, obstacle_words
 from uavdepth.obstacle_scan import ObstacleScan, SectorState
 from uavdepth.scale_estimator import ScaleEstimate, ScaleEstimator
 from uavdepth.scale_tracker import ScaleTracker
+from uavdepth.scan_memory import ScanMemory
+from uavdepth.scan_merge import merge_scans
+from uavdepth.scan_motion import PlanarPose, moved_scan
 from uavdepth.scanner import ObstacleScanner
 from uavdepth.vehicle_motion import MotionNoise, VehicleMotion
 
@@ -68,11 +72,13 @@ __all__ = [
     "MotionPoints",
     "ObstacleScan",
     "ObstacleScanner",
+    "PlanarPose",
     "PointHints",
     "ScaleEstimate",
     "ScaleEstimator",
     "ScaleTracker",
     "ScanError",
+    "ScanMemory",
     "SceneError",
     "SectorState",
     "UavDepthError",
@@ -81,6 +87,9 @@ __all__ = [
     "decode_depth_png",
     "encode_depth_png",
     "encode_obstacle_distance",
+    "load_image_mask",
+    "merge_scans",
+    "moved_scan",
     "obstacle_words",
     "vertical_height_m",
 ]

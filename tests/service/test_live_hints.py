@@ -9,12 +9,12 @@ import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from program_fakes import LEVEL, make_settings
+from program_fakes import LEVEL, make_settings, wall_over_ground
 from structlog.testing import capture_logs
 
 from service.frame import Frame
 from service.live_hints import LiveHints, sigma_of
-from service.pipeline import Perception
+from service.pipeline import SUSPICION_TEXT, Perception
 from service.settings import MotionSettings
 from service.telemetry import Telemetry
 from service.trouble import Trouble
@@ -154,6 +154,25 @@ def test_ground_and_points_are_told_together() -> None:
     assert model.told[-1].points is not None
     assert result.scale is not None
     assert result.scale.sources == ("ground", "points")
+
+
+@pytest.mark.parametrize(("height_m", "is_suspected"), [(2.0, False), (3.0, True)])
+def test_a_height_that_contradicts_the_motion_for_seconds_is_suspected(
+    height_m: float, is_suspected: bool
+) -> None:
+    class SeesTheGround(TakesPoints):
+        def infer(
+            self, image_bgr: NDArray[np.uint8], camera: CameraModel, hints: Hints | None = None
+        ) -> DepthMap:
+            depth_m = wall_over_ground(camera, WALL_M, 2.0)
+            return DepthMap(depth_m, np.full_like(depth_m, 0.05))
+
+    perception = Perception(SETTINGS, SeesTheGround(), None, ObstacleScanner(CAMERA, MOUNT))
+    for seconds in every(0.2, 6.5):
+        result = perception.step_late(frame_at(seconds), lambda at_ns: flying(at_ns, height_m=height_m))
+    assert result.scale is not None
+    assert (result.scale.suspicion is not None) is is_suspected
+    assert (perception.remark(result) == SUSPICION_TEXT) is is_suspected
 
 
 def test_a_network_that_takes_the_ground_alone_costs_no_points() -> None:

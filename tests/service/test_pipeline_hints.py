@@ -217,6 +217,30 @@ def test_a_height_is_held_for_a_while_moved_by_the_climb_and_then_given_up() -> 
     assert perception.step(frame_at(11.1), at(late_ns, height_m=None)).trouble is Trouble.NO_HEIGHT
 
 
+def test_without_a_rangefinder_the_ekf_tells_the_height_near_the_start_and_no_further() -> None:
+    model = HintedDepth()
+    perception = perception_of(model, "scale.height_source=both")
+    near = perception.step(frame_at(1.0), at(SECOND, height_m=None, position_ned_m=(3.0, 0.0, -10.0)))
+    assert near.trusted
+    assert near.scale is not None
+    assert near.scale.sources == ("ground",)
+    assert model.told[-1] is not None
+    assert model.told[-1].ground is not None
+    assert model.told[-1].ground.height_m == 10.0
+    far = perception.step(frame_at(2.0), at(2 * SECOND, height_m=None, position_ned_m=(80.0, 0.0, -10.0)))
+    assert far.trouble is Trouble.NO_HEIGHT
+    assert model.told[-1] == Hints()
+
+
+def test_what_an_autopilot_said_before_it_started_anew_is_forgotten() -> None:
+    perception = perception_of(HintedDepth())
+    assert perception.step(frame_at(10.0), at(10 * SECOND)).trusted
+    blind = at(10 * SECOND + 500 * MS, height_m=None)
+    assert perception.step(frame_at(10.5), blind).trusted
+    anew = replace(blind, at_ns=10 * SECOND + 600 * MS, epoch=1)
+    assert perception.step(frame_at(10.6), anew).trouble is Trouble.NO_HEIGHT
+
+
 def test_a_height_of_the_future_is_not_held_when_time_steps_back() -> None:
     perception = perception_of(HintedDepth())
     assert perception.step(frame_at(10.0), at(10 * SECOND)).trusted
