@@ -74,7 +74,6 @@ forward_m = 0.1
 
 [model]
 path = '{self.model}'
-threads = 1
 
 [scan]
 below_m = {BELOW_M}

@@ -21,6 +21,7 @@ from service.publisher.received import ReceivedReport
 from service.publisher.topics import PictureTopics
 from service.publisher.wire import Intrinsics, WireError
 from service.settings.zenoh import ZenohSettings
+from service.thread_rank import stand_back
 
 log = structlog.get_logger()
 
@@ -106,6 +107,7 @@ class PictureThread:
         self._look_due_ns = None
 
     def _run(self) -> None:
+        stand_back()
         newest: PerceptionResult | None = None
         try:
             while not self._stopping.is_set():

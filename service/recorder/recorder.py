@@ -22,6 +22,7 @@ from service.recorder.record_writer import MAX_SENDERS, RecordHeader, RecordWrit
 from service.recorder.shelf import Shelf, Take
 from service.recorder.tlog_writer import TlogWriter
 from service.settings import Settings
+from service.thread_rank import stand_back
 
 log = structlog.get_logger()
 
@@ -190,6 +191,7 @@ class Recorder:
     # -- the thread
 
     def _run(self) -> None:
+        stand_back()
         while not self._queue.finished:
             item = self._queue.take(_TAKE_S)
             written = False
