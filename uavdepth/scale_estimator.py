@@ -205,10 +205,9 @@ class ScaleEstimator:
         before = self._shape
         self._shape = fit_affine(samples, before, passed_s)
         if before is not None and self._shape is not None:
-            pivot = self._shape.pivot
-            held = before.inverse_m(pivot)
+            held = before.inverse_m(self._shape.network(self._shape.pivot))
             if held > 0:
-                self._filter.shift(math.log(self._shape.inverse_m(pivot) / held))
+                self._filter.shift(math.log(self._shape.pivot / held))
 
     def _ground_samples(self, values: np.ndarray, ground: GroundHint) -> AffineSamples:
         """The level ground's inverse depth at a grid of pixels that look down."""

@@ -12,6 +12,7 @@ import typer
 from service.errors import ConfigError
 
 RECORDED = Path("sitl_logs/C_s_turns.BIN")
+PIPED_WIDTH = 140
 
 
 def evaluate_motion(
@@ -75,6 +76,8 @@ def evaluate_motion(
     else:
         from rich.console import Console
 
-        Console().print(report_table(summaries, rows, wanted))
+        console = Console()
+        width = console.width if console.is_terminal else PIPED_WIDTH
+        Console(width=width).print(report_table(summaries, rows, wanted))
     if strict and not all(target.met for target in wanted):
         raise typer.Exit(1)

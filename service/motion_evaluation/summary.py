@@ -91,11 +91,11 @@ def targets(groups: Mapping[str, GroupSummary]) -> list[Target]:
             for depth in ("network", "truth relative", "truth affine"):
                 found += _scale_targets(f"{name}: scale of {depth}", group.scales.get(f"{depth}, both"))
         elif name == "kitti raw":
+            scale = group.scales.get("network, points")
             if group.hinted_abs_rel is not None:
                 what = f"{name}: Abs Rel of the network with live hints"
                 found.append(_most(what, group.hinted_abs_rel, KITTI_ABS_REL))
-            scale = group.scales.get("network, points")
-            if scale is not None:
+            elif scale is not None:
                 found.append(_most(f"{name}: Abs Rel with the estimator", scale.abs_rel, KITTI_ABS_REL))
     return found
 
