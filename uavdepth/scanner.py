@@ -17,6 +17,7 @@ from uavdepth.errors import ImageSizeError, ScanError
 from uavdepth.level_ground import GROUND_DEPTH_SHARE, LevelGround, find_level_ground
 from uavdepth.obstacle_scan import SECTOR_WIDTH_DEG, ObstacleScan, SectorState, sector_bearings_deg
 from uavdepth.range_histogram import RangeHistogram
+from uavdepth.sloping_ground import GroundProfile, SlopingGround
 
 SMALLEST_SIZE_M = 0.25
 """Side of the square that must be found at maximum distance; sets the default of min_pixels."""
@@ -36,12 +37,16 @@ LARGEST_SHORTENING = 0.5
 stop the vehicle for good."""
 
 _GROUND_STRIDE = 4
+_SLOPE_ROWS, _SLOPE_COLUMNS = 2, 8
 _ROWS_WORKED_ON = 160
 """Rows are joined in groups, the nearest pixel of each group standing for it, until about so many are
 left: nothing near is lost, and the time of a scan does not grow with the picture's height."""
 
 _CHUNK = 32768
 """Points worked on at a time, so that the intermediate arrays stay in the processor's cache."""
+
+_Ground = tuple[LevelGround | None, GroundProfile | None]
+"""What is ground at any slope: the level below the vehicle, and what is seen to rise from there."""
 
 _Pixel = TypeVar("_Pixel", np.float32, np.bool_)
 
@@ -81,12 +86,14 @@ class ObstacleScanner:
             `SMALLEST_SIZE_M` there, but at least 6.
         ground_tolerance: relative error of depth that must not make an obstacle of the ground, 0 to
             0.5. What rises less than this share of the height is lost among the ground.
+        max_ground_slope_deg: ground that rises no steeper is no obstacle, as far as its surface is seen and
+            while it stays `FLIGHT_CLEARANCE_M` below the flight level; 0 to 25. It needs a known height.
         sigma_factor: standard deviations that distances are shortened by, 0 to 5; 0: uncertainty is ignored.
         mask: (H, W) bool, True where the picture is not to be looked at (see `load_image_mask`): unknown.
 
     Raises:
         ScanError: distances that are not finite with 0 < min < max, a band without height, a sigma_factor
-            outside its limits.
+            or slope outside its limits.
         ImageSizeError: a mask that is not (H, W) of the camera.
 
     Example:
@@ -106,6 +113,7 @@ class ObstacleScanner:
         ground_tolerance: float = GROUND_DEPTH_SHARE,
         sigma_factor: float = 1.0,
         mask: NDArray[np.bool_] | None = None,
+        max_ground_slope_deg: float = 15.0,
     ) -> None:
         if not (math.isfinite(max_distance_m) and 0.01 <= min_distance_m < max_distance_m <= 599.0):
             raise ScanError(
@@ -120,6 +128,8 @@ class ObstacleScanner:
             raise ScanError(f"ground_tolerance is {ground_tolerance}: 0 to 0.5 is needed")
         if not 0.0 <= sigma_factor <= 5.0:
             raise ScanError(f"sigma_factor is {sigma_factor}: 0 to 5 is needed")
+        if not 0.0 <= max_ground_slope_deg <= 25.0:
+            raise ScanError(f"max_ground_slope_deg is {max_ground_slope_deg}: 0 to 25 is needed")
         self.camera = camera
         self.mount = mount
         self._sigma_factor = np.float32(sigma_factor)
@@ -134,6 +144,8 @@ class ObstacleScanner:
         self._rays = rays.reshape(3, -1)
         self._joined_rays = _mean_of_rows(rays, self._together).reshape(3, -1)
         self._ground_rays = body_rays(camera, mount, _GROUND_STRIDE).reshape(3, -1)
+        self._slope_rays = np.ascontiguousarray(rays[:, 1::_SLOPE_ROWS, 4::_SLOPE_COLUMNS]).reshape(3, -1)
+        self._sloping = SlopingGround(max_ground_slope_deg, max_distance_m, ground_tolerance)
         self._view = BandView(camera, mount, max_distance_m, below_m, above_m)
         self._histogram = RangeHistogram(max_distance_m, self._joined_rays.shape[1])
         self._needed = self._needed_pixels(min_pixels)
@@ -175,10 +187,11 @@ class ObstacleScanner:
             shortening = self._of_camera("uncertainty", sigma) * self._sigma_factor
         level = attitude.level_from_body
         ground = self._ground(depth, level, height_m)
+        rising = self._rising_ground(depth, level, ground)
 
         joined = _nearest_of_rows(self._without_speckles(depth), self._together)
-        distance = self._nearest(joined.ravel(), level, ground, self._told_shortening(shortening))
-        clear = self._seen_free(depth.ravel(), level, ground, shortening)
+        distance = self._nearest(joined.ravel(), level, (ground, rising), self._told_shortening(shortening))
+        clear = self._seen_free(depth.ravel(), level, (ground, rising), shortening)
         state = np.where(clear, SectorState.CLEAR, SectorState.UNKNOWN).astype(np.uint8)
         state[~np.isnan(distance)] = SectorState.OBSTACLE
         return ObstacleScan(distance, state, self._bearings, self.min_distance_m, self.max_distance_m)
@@ -214,7 +227,7 @@ class ObstacleScanner:
         self,
         depth: NDArray[np.float32],
         level: NDArray[np.float64],
-        ground: LevelGround | None,
+        ground: _Ground,
         shortening: NDArray[np.float32] | None,
     ) -> NDArray[np.float32]:
         """(72,) distance of the nearest obstacle, NaN for none, from every pixel."""
@@ -222,7 +235,7 @@ class ObstacleScanner:
         for start in range(0, depth.size, _CHUNK):
             chunk = slice(start, start + _CHUNK)
             points, range_m = self._level_points(self._joined_rays[:, chunk], depth[chunk], level)
-            obstacle = self._is_obstacle(points[2], range_m, ground)
+            obstacle = self._is_obstacle(points, range_m, ground)
             if obstacle.any():
                 doubt = None if shortening is None else shortening[chunk]
                 self._histogram.add(points[0], points[1], range_m, obstacle, doubt)
@@ -232,7 +245,7 @@ class ObstacleScanner:
         self,
         depth: NDArray[np.float32],
         level: NDArray[np.float64],
-        ground: LevelGround | None,
+        ground: _Ground,
         shortening: NDArray[np.float32] | None,
     ) -> NDArray[np.bool_]:
         """(72,) whether the band is seen and free up to maximum distance."""
@@ -240,13 +253,13 @@ class ObstacleScanner:
         probed = depth[probe.pixel]
         rays = self._rays[:, probe.pixel]
         points, range_m = self._level_points(rays, probed, level)
-        free = (probed > 0) & ~self._is_obstacle(points[2], range_m, ground)
+        free = (probed > 0) & ~self._is_obstacle(points, range_m, ground)
         if shortening is not None:
             # NaN fails: no claim is not a small claim.
             doubt = shortening.ravel()[probe.pixel]
             certain = (doubt >= 0) & (doubt < 1)
             points, range_m = self._level_points(rays, probed * (1 - doubt), level)
-            free &= certain & ~self._is_obstacle(points[2], range_m, ground)
+            free &= certain & ~self._is_obstacle(points, range_m, ground)
         return seen_sectors(free, probe.cell, FREE_SHARE)
 
     def _level_points(
@@ -265,8 +278,9 @@ class ObstacleScanner:
         return points, range_m
 
     def _is_obstacle(
-        self, down_m: NDArray[np.float32], range_m: NDArray[np.float32], ground: LevelGround | None
+        self, points: NDArray[np.float32], range_m: NDArray[np.float32], grounds: _Ground
     ) -> NDArray[np.bool_]:
+        (ground, rising), down_m = grounds, points[2]
         deepest = self.below_m if ground is None else min(self.below_m, ground.deep_m)
         with np.errstate(invalid="ignore"):
             obstacle = down_m >= np.float32(-self.above_m)
@@ -276,7 +290,10 @@ class ObstacleScanner:
                 limit = range_m * np.float32(-ground.slope)
                 limit += np.float32(ground.height_m)
                 obstacle &= down_m <= limit
-        return obstacle
+        if rising is not None:
+            low = np.flatnonzero(obstacle & (down_m >= np.float32(rising.shallowest_m)))
+            obstacle[low] = ~rising.is_ground(points[:, low], range_m[low])
+        return np.asarray(obstacle, dtype=np.bool_)
 
     def _ground(
         self, depth: NDArray[np.float32], level: NDArray[np.float64], height_m: float | None
@@ -290,6 +307,16 @@ class ObstacleScanner:
         directions = level[2].astype(np.float32) @ self._ground_rays
         directions /= np.linalg.norm(self._ground_rays, axis=0)
         return find_level_ground(points[2], range_m, directions, self._ground_tolerance)
+
+    def _rising_ground(
+        self, depth: NDArray[np.float32], level: NDArray[np.float64], ground: LevelGround | None
+    ) -> GroundProfile | None:
+        if ground is None or not self._sloping.may_matter(ground, self.below_m):
+            return None
+        sparse = depth[1::_SLOPE_ROWS, 4::_SLOPE_COLUMNS].ravel()
+        sparse = np.where(sparse > 0, sparse, np.float32(np.nan))
+        points, range_m = self._level_points(self._slope_rays, sparse, level)
+        return self._sloping.find(points, range_m, ground)
 
     def _needed_pixels(self, min_pixels: int | None) -> NDArray[np.int64]:
         """(bins,) joined pixels that make an obstacle at each distance of the histogram."""

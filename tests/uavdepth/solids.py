@@ -26,6 +26,23 @@ def ground(height_m: float) -> Solid:
     return meet
 
 
+def slope(height_m: float, rise_deg: float, from_m: float | None = None) -> Solid:
+    """Ground `height_m` below the vehicle that rises ahead: everywhere, or from `from_m` on."""
+    climb = np.tan(np.radians(rise_deg))
+    foot = 0.0 if from_m is None else from_m
+
+    def meet(origin: Array, rays: Array) -> Array:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            flat = (height_m - origin[2]) / rays[:, 2]
+            risen = (height_m - origin[2] - climb * (origin[0] - foot)) / (rays[:, 2] + climb * rays[:, 0])
+            before = (from_m is not None) & (origin[0] + flat * rays[:, 0] < foot)
+            beyond = (from_m is None) | (origin[0] + risen * rays[:, 0] >= foot)
+        flat = np.where((flat > 0) & before, flat, np.inf)
+        return np.minimum(flat, np.where((risen > 0) & beyond, risen, np.inf))
+
+    return meet
+
+
 def box(lowest: Sequence[float], highest: Sequence[float]) -> Solid:
     """Box along the level frame's axes between two corners (forward, right, down)."""
 

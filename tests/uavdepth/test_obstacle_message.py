@@ -51,7 +51,7 @@ def one(distance_m: float, state: int = SectorState.OBSTACLE, **limits: float) -
         (-math.inf, UNKNOWN_WORD),
     ],
 )
-def test_an_obstacle_is_told_in_centimetres_rounded_down_within_the_legal_span(distance_m, word):
+def test_r6_an_obstacle_is_told_in_centimetres_rounded_down_within_the_legal_span(distance_m, word):
     assert one(distance_m) == word
 
 
@@ -89,7 +89,7 @@ legal_limits = st.tuples(st.integers(1, 500), st.integers(600, 60000)).map(
 
 
 @given(any_distances, any_states, legal_limits)
-def test_whatever_comes_in_only_legal_words_leave(distance, state, limits):
+def test_r6_whatever_comes_in_only_legal_words_leave(distance, state, limits):
     scan = scan_of(distance, state, nearest=limits[0], farthest=limits[1])
     message = encode_obstacle_distance(scan)
     low, high = message.min_distance, message.max_distance
@@ -99,7 +99,7 @@ def test_whatever_comes_in_only_legal_words_leave(distance, state, limits):
 
 
 @given(any_distances, any_states)
-def test_doubt_never_leaves_as_clear(distance, state):
+def test_r7_doubt_never_leaves_as_clear(distance, state):
     words = obstacle_words(scan_of(distance, state))
     with np.errstate(invalid="ignore"):
         wide = distance.astype(np.float64)
@@ -115,7 +115,7 @@ def test_an_obstacle_is_never_told_farther_than_it_is(distance, state):
     assert (words[told] / 100 <= distance[told].astype(np.float64) + 2e-5).all()
 
 
-def test_the_message_has_the_layout_that_is_safe_on_both_autopilots():
+def test_r3_the_message_has_the_layout_that_is_safe_on_both_autopilots():
     message = encode_obstacle_distance(scan_of(np.full(72, np.nan), np.zeros(72)), time_usec=123)
     assert message.time_usec == 123
     assert message.sensor_type == mavlink.MAV_DISTANCE_SENSOR_UNKNOWN

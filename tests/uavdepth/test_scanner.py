@@ -24,7 +24,7 @@ OBSTACLE, CLEAR, UNKNOWN = SectorState.OBSTACLE, SectorState.CLEAR, SectorState.
 
 class TestPoles:
     @pytest.mark.parametrize("bearing", [-30, -10, 0, 10, 30])
-    def test_a_pole_lands_in_its_own_element_at_its_distance(self, camera, mount, level, bearing):
+    def test_r4_a_pole_lands_in_its_own_element_at_its_distance(self, camera, mount, level, bearing):
         depth = depth_of([pole(bearing, 8.0, 0.1)], camera, mount, level)
         scan = ObstacleScanner(camera, mount).scan(depth, level)
         assert obstacles(scan) == [element(bearing)]
@@ -40,7 +40,7 @@ class TestPoles:
         assert obstacles(scan) == [element(10)]
         assert scan.nearest_m == pytest.approx(5.9, rel=0.02)
 
-    def test_yaw_does_not_move_elements(self, camera, mount, level):
+    def test_r3_yaw_does_not_move_elements(self, camera, mount, level):
         depth = depth_of([pole(10, 6.0, 0.1)], camera, mount, level)
         scanner = ObstacleScanner(camera, mount)
         north, west = scanner.scan(depth, level), scanner.scan(depth, attitude_deg(yaw=-90))

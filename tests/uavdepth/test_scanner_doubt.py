@@ -18,7 +18,7 @@ OBSTACLE, CLEAR, UNKNOWN = SectorState.OBSTACLE, SectorState.CLEAR, SectorState.
 
 
 class TestDoubt:
-    def test_open_sky_and_ground_are_clear_across_the_picture_and_unknown_beside_it(
+    def test_r7_open_sky_and_ground_are_clear_across_the_picture_and_unknown_beside_it(
         self, camera, mount, level
     ):
         scan = ObstacleScanner(camera, mount).scan(depth_of([ground(5)], camera, mount, level), level, 5.0)
@@ -35,13 +35,13 @@ class TestDoubt:
         scan = ObstacleScanner(camera, mount).scan(depth, level)
         assert obstacles(scan) == [element(45)]
 
-    def test_unknown_depth_is_unknown(self, camera, mount, level):
+    def test_r7_unknown_depth_is_unknown(self, camera, mount, level):
         scan = ObstacleScanner(camera, mount).scan(np.full((320, 640), np.nan, np.float32), level, 5.0)
         assert (scan.state == UNKNOWN).all()
         assert np.isnan(scan.distance_m).all()
 
     @pytest.mark.parametrize("nothing", [0.0, -1.0, -np.inf])
-    def test_zero_and_negative_depth_is_unknown(self, camera, mount, level, nothing):
+    def test_r6_zero_and_negative_depth_is_unknown(self, camera, mount, level, nothing):
         scan = ObstacleScanner(camera, mount).scan(np.full((320, 640), nothing, np.float32), level, 5.0)
         assert (scan.state == UNKNOWN).all()
 
@@ -85,7 +85,7 @@ class TestDoubt:
 
 
 class TestNoise:
-    def test_one_wrong_pixel_in_a_hundred_makes_no_obstacle(self, camera, mount, level):
+    def test_r13_one_wrong_pixel_in_a_hundred_makes_no_obstacle(self, camera, mount, level):
         rng = np.random.default_rng(5)
         scanner = ObstacleScanner(camera, mount)
         for nearest, farthest in ((0.2, 20.0), (1.0, 1.0), (3.0, 6.0)):
@@ -96,7 +96,7 @@ class TestNoise:
             assert obstacles(scan) == []
             assert (scan.state[element(-40) : element(40) + 1] == CLEAR).all()
 
-    def test_a_thin_pole_stays_in_noise(self, camera, mount, level):
+    def test_r13_a_thin_pole_stays_in_noise(self, camera, mount, level):
         rng = np.random.default_rng(6)
         scanner = ObstacleScanner(camera, mount)
         true = depth_of([pole(11, 6.0, 0.02), ground(5)], camera, mount, level)
@@ -108,7 +108,7 @@ class TestNoise:
             assert obstacles(scan) == [element(10)]
             assert scan.nearest_m == pytest.approx(6.0, rel=0.05)
 
-    def test_flicker_of_twenty_percent_moves_the_nearest_by_less_than_ten(self, camera, mount, level):
+    def test_r13_flicker_of_twenty_percent_moves_the_nearest_by_less_than_ten(self, camera, mount, level):
         rng = np.random.default_rng(7)
         scanner = ObstacleScanner(camera, mount)
         true = depth_of([wall(8), ground(5)], camera, mount, level)
@@ -125,7 +125,7 @@ class TestNoise:
         scan = ObstacleScanner(camera, mount).scan(depth, level)
         assert 0.87 * 8 < scan.distance_m[element(0)] <= 8
 
-    def test_a_speck_the_size_of_a_fingernail_is_no_obstacle(self, camera, mount, level):
+    def test_r13_a_speck_the_size_of_a_fingernail_is_no_obstacle(self, camera, mount, level):
         depth = np.full((320, 640), np.inf, np.float32)
         depth[100:105, 320:325] = 1.0
         assert obstacles(ObstacleScanner(camera, mount).scan(depth, level)) == []

@@ -17,7 +17,7 @@ from uavdepth import (
 
 class TestGround:
     @pytest.mark.parametrize("known_height", [True, False], ids=["height known", "height not known"])
-    def test_flat_ground_is_never_an_obstacle(self, camera, mount, known_height):
+    def test_r1_flat_ground_is_never_an_obstacle(self, camera, mount, known_height):
         scanner = ObstacleScanner(camera, mount)
         rng = np.random.default_rng(1)
         for _ in range(100):
@@ -61,7 +61,7 @@ class TestGround:
         assert obstacles(scan) == []
 
     @pytest.mark.parametrize("height", [2.0, None])
-    def test_a_small_box_on_the_ground_is_an_obstacle(self, camera, mount, level, height):
+    def test_r2_a_small_box_on_the_ground_is_an_obstacle(self, camera, mount, level, height):
         things = [ground(2.0), box((5, -0.25, 1.5), (5.5, 0.25, 2.0))]
         scan = ObstacleScanner(camera, mount).scan(depth_of(things, camera, mount, level), level, height)
         assert element(0) in obstacles(scan)
