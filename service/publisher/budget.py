@@ -42,7 +42,7 @@ _RETREAT: Final = 0.85
 _DEEPEST: Final = 0.7
 """Least of the budget that one retreat believes to have arrived: one report counts few pictures."""
 
-_STANDING: Final = 2
+_STANDING: Final = 3
 """Reports in a row that must tell of waiting."""
 
 _BASE_WINDOW_NS: Final = 20_000_000_000

@@ -8,6 +8,7 @@ import zenoh
 
 from service.errors import PublisherError
 from service.security.errors import SecurityError
+from service.security.security import Security
 
 RETRY_NS = 2_000_000_000
 
@@ -21,6 +22,7 @@ class Line:
         listen, connect: endpoints.
         open_session: opens a session on them.
         opened: declares what the session is for.
+        security: whose certificate may be out of date, which is told.
     """
 
     def __init__(
@@ -29,10 +31,12 @@ class Line:
         connect: Sequence[str],
         open_session: Open,
         opened: Callable[[Line, zenoh.Session], None],
+        security: Security | None = None,
     ) -> None:
         self._listen, self._connect = tuple(listen), tuple(connect)
         self._open_session = open_session
         self._opened = opened
+        self._security = security
         self._due_ns: int | None = None
         self.session: zenoh.Session | None = None
         """The session, None while it cannot be had."""
@@ -68,5 +72,15 @@ class Line:
             return 0
         peers = len(self.session.info.peers_zid()) + len(self.session.info.routers_zid())
         away = bool(self._connect) and peers == 0
-        self.problem = f"no peer at {', '.join(self._connect)}; tried again" if away else ""
+        problem = f"no peer at {', '.join(self._connect)}; tried again" if away else ""
+        if peers == 0 and self._security is not None:
+            problem = _validity(self._security) or problem
+        self.problem = problem
         return peers
+
+
+def _validity(security: Security) -> str | None:
+    try:
+        return security.validity_problem()
+    except SecurityError as error:
+        return str(error)

@@ -50,7 +50,8 @@ class ScanThread:
         self._lines: list[Line] = []
         for listen, connect in ((settings.listen, ()), ((), settings.connect)):
             if listen or connect:
-                self._lines.append(Line(listen, connect, open_session, self._declarer(vehicle, bool(listen))))
+                declare = self._declarer(vehicle, bool(listen))
+                self._lines.append(Line(listen, connect, open_session, declare, settings.security))
         self.results: LatestSlot[PerceptionResult] = LatestSlot()
         self.statuses: LatestSlot[StatusSample] = LatestSlot()
         self.samples = 0

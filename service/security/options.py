@@ -34,5 +34,5 @@ def load_zenoh_settings(path: Path | None, overrides: tuple[str, ...] = ()) -> Z
     from service.settings.load import load_settings
 
     settings = load_settings(path, overrides, needs_camera=False).zenoh
-    settings.security.check((), ())
+    settings.security.check(settings.listen, settings.connect)
     return settings

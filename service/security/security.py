@@ -9,7 +9,13 @@ from typing import Any
 
 from service.security.access import Access
 from service.security.errors import SecurityError
-from service.security.files import check_certificates, check_private, read_password, read_users
+from service.security.files import (
+    check_certificates,
+    check_private,
+    read_password,
+    read_users,
+    validity_problem,
+)
 
 _TLS = "tls/"
 _CREDENTIALS_FREE = ("tcp/", "udp/")
@@ -50,7 +56,7 @@ class Security:
     def check(self, listen: Sequence[str], connect: Sequence[str]) -> None:
         """Whether the files are there, fit together and stay private.
 
-        Certificates that are out of date are not looked at: see `service.security.files.validity_problem`.
+        Certificates that are out of date are not looked at: see `validity_problem`.
 
         Raises:
             SecurityError: the first thing that is wrong, with the file and the fix.
@@ -75,6 +81,14 @@ class Security:
             raise SecurityError(
                 "an access list needs names that can be trusted: certificates, or a users_file, or both"
             )
+
+    def validity_problem(self) -> str | None:
+        """Why the certificate does not hold now, or None if it does or there is none.
+
+        Raises:
+            SecurityError: a certificate that cannot be read.
+        """
+        return None if self.certificates is None else validity_problem(self.certificates.certificate)
 
     def options(self) -> dict[str, Any]:
         """Zenoh's configuration keys and values.
