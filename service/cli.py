@@ -75,6 +75,13 @@ COMMANDS = {
     "evaluate-motion": Command(
         "service.motion_evaluation.command", "evaluate_motion", "Measure metres from motion.", "sim"
     ),
+    "keys": Command(
+        "service.security.command", "keys_app", "Make certificates and passwords of a fleet.", is_group=True
+    ),
+    "router": Command("service.router_command", "router", "Hand on between vehicles and ground stations."),
+    "benchmark-fleet": Command(
+        "service.benchmark.stream_fleet_command", "benchmark_fleet", "Measure a fleet through one router."
+    ),
     "model": Command(
         "service.model_command", "model_app", "Check a depth network and its card.", is_group=True
     ),
