@@ -16,6 +16,7 @@ from uavdepth.errors import ImageSizeError
 from uavdepth.feature_tracks import MOST_FRAMES, FeatureTracks
 from uavdepth.hints import PointHints
 from uavdepth.triangulation import triangulate
+from uavdepth.turn_check import TurnCheck
 from uavdepth.vehicle_motion import CameraMotion, VehicleMotion
 
 _TRACKING_WIDTH = 640
@@ -27,6 +28,9 @@ _LONGEST_GAP_NS = 500_000_000
 
 _BASELINE_SIGMAS = 3.0
 """In hover the baseline does not stand out of its own noise, and there is no depth."""
+
+_LEAST_TRACKS_OF_TURN = 30
+"""Fewer do not tell how far a picture turned."""
 
 _MOST_VIEWS = 4
 """Besides the newest; more of them, spread over the same time, add work but hardly any certainty."""
@@ -89,7 +93,13 @@ class MotionPoints:
         self._tracks = FeatureTracks()
         self._times: deque[int] = deque(maxlen=MOST_FRAMES)
         self._carried = CarriedPoints(camera, self.settings.carry_s)
+        self._turns = TurnCheck()
         self._last = _no_points()
+
+    @property
+    def suspicion(self) -> str | None:
+        """What turns in flight show to be wrong with the focal length, in words, or None."""
+        return self._turns.suspicion
 
     def clear(self) -> None:
         """Forget all tracks and points."""
@@ -189,6 +199,9 @@ class MotionPoints:
         found = triangulate(
             rays, seen, [moved for _, moved in views], sigma, motion.noise, pixel * settings.pixel_sigma
         )
+        if len(several) >= _LEAST_TRACKS_OF_TURN:
+            oldest = int(np.argmin(rows))
+            self._turns.add(views[oldest][1].rotation, found.rotations[oldest])
         relative = np.hypot(found.relative_sigma, settings.model_sigma)
         good = relative <= settings.largest_sigma
         good &= found.residual <= settings.largest_residual

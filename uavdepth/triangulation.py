@@ -54,6 +54,7 @@ class Triangulation:
         residual: (N,) root mean square of the re-projection errors, in standard deviations of a pixel's.
         parallax_rad: (N,) largest angle between the newest and another ray to the point.
         views: (N,) other views that saw the point.
+        rotations: (M, 3, 3) from the newest view's axes into each other view's, as the points show them.
     """
 
     depth_m: Array
@@ -61,6 +62,7 @@ class Triangulation:
     residual: Array
     parallax_rad: Array
     views: NDArray[np.intp]
+    rotations: Array
 
 
 def triangulate(
@@ -166,6 +168,7 @@ class _Solver:
             rms,
             np.where(self.there, parallax, 0.0).max(axis=0, initial=0.0),
             self.there.sum(axis=0),
+            self.rotations,
         )
 
     def _misfit(self, residual: Array) -> Array:
