@@ -11,7 +11,7 @@ COMPONENT_ID = mavlink.MAV_COMP_ID_OBSTACLE_AVOIDANCE
 
 _PERIOD_NS = 1_000_000_000
 _LEAST_GAP_NS = 200_000_000
-"""A change of state is told at once, but no faster than this."""
+"""A change of state is told at once, but no faster after the last one than this."""
 
 
 class Presence:
@@ -21,7 +21,7 @@ class Presence:
         self._state = ServiceState.BOOT
         self._told: ServiceState | None = None
         self._beat_ns: int | None = None
-        self._told_at_ns = 0
+        self._changed_ns: int | None = None
 
     def set_state(self, state: ServiceState) -> None:
         """Tell this state from now on."""
@@ -38,9 +38,10 @@ class Presence:
         elif now_ns - self._beat_ns >= _PERIOD_NS:
             late_ns = now_ns - self._beat_ns - _PERIOD_NS
             self._beat_ns = now_ns if late_ns >= _PERIOD_NS else self._beat_ns + _PERIOD_NS
-        elif self._state == self._told or now_ns - self._told_at_ns < _LEAST_GAP_NS:
+        elif self._state == self._told or not self._may_change(now_ns):
             return None
-        self._told, self._told_at_ns = self._state, now_ns
+        if self._state != self._told:
+            self._told, self._changed_ns = self._state, now_ns
         return mavlink.MAVLink_heartbeat_message(
             mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
             mavlink.MAV_AUTOPILOT_INVALID,
@@ -49,3 +50,6 @@ class Presence:
             int(self._state),
             3,  # mavlink_version, fixed by the protocol
         )
+
+    def _may_change(self, now_ns: int) -> bool:
+        return self._changed_ns is None or now_ns - self._changed_ns >= _LEAST_GAP_NS

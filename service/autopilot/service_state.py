@@ -14,5 +14,5 @@ class ServiceState(IntEnum):
     """Ready, but depth cannot be trusted or a part is missing: no obstacles are sent."""
     ACTIVE = 4
     """Obstacles are being sent."""
-    CRITICAL = 6
+    CRITICAL = 5
     """Something has failed that protected the vehicle until now."""

@@ -160,7 +160,7 @@ def test_a_flapping_state_does_not_flood_the_line() -> None:
 
 @pytest.mark.parametrize(
     ("state", "word"),
-    [(ServiceState.BOOT, 1), (ServiceState.STANDBY, 3), (ServiceState.ACTIVE, 4), (ServiceState.CRITICAL, 6)],
+    [(ServiceState.BOOT, 1), (ServiceState.STANDBY, 3), (ServiceState.ACTIVE, 4), (ServiceState.CRITICAL, 5)],
 )
 def test_states_are_mavlinks(state: ServiceState, word: int) -> None:
     talk = Conversation(S)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -20,10 +20,12 @@ from program_fakes import (
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from service.autopilot.hold_request import HoldOutcome
+from service.cameras.reader import CameraState
 from service.clock import MonotonicClock
 from service.errors import CameraError
 from service.fake_autopilot.fake_autopilot import FakeAutopilot
 from service.fake_autopilot.pilot import Pilot
+from service.health import Announcer, Vitals, state_of, trouble_of
 from service.hold_on_loss import HoldOnLoss, Moment
 from service.pipeline import Perception
 from service.run import Service
@@ -263,6 +265,35 @@ class TestHowItIsAsked:
         assert talk.session.ask_to_hold() == ""
         Flight(talk, Voice()).fly(1.0)
         assert talk.session.status(talk.now_ns).hold is None
+
+
+def test_half_a_second_after_the_last_distances_the_pilot_has_a_text_and_the_heartbeat_is_critical() -> None:
+    """The monitor looks every 50 ms, the link's thread turns every 20 ms."""
+    talk = Talk().talk
+    announcer, told = (
+        Announcer(),
+        Vitals(
+            talk.now_ns, 0, CameraState.DELIVERING, True, True, talk.now_ns, talk.now_ns, None, talk.now_ns
+        ),
+    )
+    for late_ns in range(-2 * S, 501 * MS, 50 * MS):
+        if late_ns < 0:
+            told = replace(told, frame_ns=talk.now_ns, result_ns=talk.now_ns, sent_ns=talk.now_ns)
+        now = replace(told, now_ns=talk.now_ns)
+        trouble = trouble_of(now)
+        state = state_of(trouble, now)
+        talk.session.set_state(state)
+        words = announcer.hear(trouble, state, talk.now_ns)
+        if words is not None:
+            talk.session.say(words.severity, words.text, talk.now_ns)
+        talk.hear(Voice().attitude(talk.now_ns // MS))
+        talk.wait_s(0.05)
+    last_sent_ns = told.sent_ns or 0
+    (text,) = [(at, m) for at, m in talk.sent_of("STATUSTEXT") if "OFF" in m.text]
+    beats = [(at, m) for at, m in talk.sent_of("HEARTBEAT") if m.system_status == mavlink.MAV_STATE_CRITICAL]
+    assert text[1].severity == mavlink.MAV_SEVERITY_CRITICAL
+    assert text[0] - last_sent_ns <= 500 * MS
+    assert beats[0][0] - last_sent_ns <= 500 * MS
 
 
 class SeesAWall:
