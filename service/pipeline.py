@@ -216,6 +216,7 @@ def make_scanner(settings: Settings) -> Scanner:
         above_m=scan.above_m,
         sigma_factor=scan.sigma_factor,
         mask=mask,
+        max_ground_slope_deg=scan.max_ground_slope_deg,
     )
 
 
