@@ -26,6 +26,9 @@ STAMPS = "timestamps.txt"
 _DONE_NS = 100_000_000
 """Pictures count as measured so long after their capture: what the autopilot said by then is known."""
 
+_BARE_STREAMS = frozenset({".mjpeg", ".mjpg", ".h264", ".264", ".h265", ".265", ".hevc", ".m4v", ".yuv"})
+"""Streams without a container: FFmpeg makes up 25 pictures a second for them."""
+
 _LEAST_OVERLAP_NS = 100_000_000
 _MOST_PICTURES = 10_000_000
 _READERS: dict[str, Callable[[Path], list[Packets]]] = {
@@ -134,6 +137,8 @@ def _folder_times(folder: Path, fps: float | None) -> NDArray[np.float64]:
 
 def _video_times(path: Path, fps: float | None) -> NDArray[np.float64]:
     """The pictures' times from the container, without decoding them."""
+    if fps is None and path.suffix.lower() in _BARE_STREAMS:
+        raise RecordError(f"{path}: a bare {path.suffix} stream carries no time stamps: give --fps")
     capture = _opened(path)
     times: list[float] = []
     try:
