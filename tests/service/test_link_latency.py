@@ -134,6 +134,15 @@ def test_r9_in_a_turn_of_90_degrees_a_second_200_ms_old_bearings_are_right_to_5_
     assert min(message.distances) == 800
 
 
+def test_r9_messages_that_come_up_to_100_ms_late_do_not_spoil_it() -> None:
+    flight = Turning(90.0, jitter_ms=100)
+    flight.fly(3.0)
+    for _ in range(20):
+        flight.fly(0.1)
+        found = told_at(flight.tell(pole(0.0, 8.0), age_ms=200))
+        assert max(abs(bearing + 18.0) for bearing in found) < 5.0
+
+
 def test_r9_without_the_turn_made_good_the_same_bearing_would_be_18_degrees_off() -> None:
     flight = Turning(90.0)
     flight.fly(3.0)
