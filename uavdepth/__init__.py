@@ -38,7 +38,6 @@ from uavdepth.motion_points import MotionPoints, MotionPointSettings
 from uavdepth.obstacle_message import encode_obstacle_distance, obstacle_words
 from uavdepth.obstacle_scan import ObstacleScan, SectorState
 from uavdepth.scale_estimator import ScaleEstimate, ScaleEstimator
-from uavdepth.scale_tracker import ScaleTracker
 from uavdepth.scan_memory import ScanMemory
 from uavdepth.scan_merge import merge_scans
 from uavdepth.scan_motion import PlanarPose, moved_scan
@@ -76,7 +75,6 @@ __all__ = [
     "PointHints",
     "ScaleEstimate",
     "ScaleEstimator",
-    "ScaleTracker",
     "ScanError",
     "ScanMemory",
     "SceneError",

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 class DepthMap:
     """Depth at the pixels of a camera.
 
-    A network that tells depth up to one factor gives it in units of its own: `GroundScaler` finds the
+    A network that tells depth up to one factor gives it in units of its own: `ScaleEstimator` finds the
     factor. A network that tells inverse depth up to scale and shift has no depth at all until both are
     found: then `depth_m` is NaN everywhere, so that nobody takes its numbers for metres, and `fitted`
     makes depth of `affine_inverse_depth`.

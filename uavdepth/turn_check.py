@@ -15,7 +15,7 @@ _MEMORY = 150.0
 """So many turns (one a picture, overlapping) count; older ones fade."""
 
 _LEAST_TURNS = 15.0
-_LEAST_OFF = 0.08
+_LEAST_OFF = 0.05
 _SIGMAS = 3.0
 
 
