@@ -105,13 +105,15 @@ class Metres:
         trouble = _trouble_of(raw, telemetry)
         if trouble is not None or telemetry.attitude is None:
             return replace(measured, trouble=trouble)
-        by_ground = ground.sigma(telemetry.attitude) if isinstance(ground, KnownGround) else math.inf
+        by_ground = math.inf
+        if isinstance(ground, KnownGround) and "ground" in self._takes:
+            by_ground = ground.sigma(telemetry.attitude)
         by_points = sigma_of(points) if "points" in self._takes else math.inf
         sources = tuple(
             name for name, sigma in (("ground", by_ground), ("points", by_points)) if sigma <= self._max_sigma
         )
         if math.isinf(min(by_ground, by_points)):
-            return replace(measured, trouble=ground if isinstance(ground, Trouble) else Trouble.NO_HEIGHT)
+            return replace(measured, trouble=ground if isinstance(ground, Trouble) else Trouble.NO_POINTS)
         age_s = ground.height.age_s if isinstance(ground, KnownGround) and "points" not in sources else 0.0
         if len(sources) > 1:
             self._compare(raw, ground, points, frame.captured_ns)

@@ -19,6 +19,7 @@ class Trouble(Enum):
     NO_ATTITUDE = "no attitude at picture time"
     NO_HEIGHT = "no height above ground"
     NO_GROUND = "no ground seen to scale depth"
+    NO_POINTS = "no points measured by motion"
     BAD_SCALE = "metric scale is uncertain"
     OLD_SCALE = "metric scale is too old"
     NOT_SENT = "autopilot link takes no distances"

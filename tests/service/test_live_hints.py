@@ -184,6 +184,13 @@ def test_a_network_that_takes_the_ground_alone_costs_no_points() -> None:
     assert result.trouble is Trouble.NO_HEIGHT
 
 
+def test_a_height_is_no_scale_for_a_network_that_takes_points_alone() -> None:
+    scanner = ObstacleScanner(CAMERA, MOUNT)
+    perception = Perception(SETTINGS, TakesPoints(), None, scanner, takes=("points",))
+    first = perception.step_late(frame_at(1.0), lambda at_ns: flying(at_ns, height_m=2.0))
+    assert first.trouble is Trouble.NO_POINTS
+
+
 def test_a_network_that_takes_no_hints_gets_its_scale_from_points() -> None:
     class Unit(TakesPoints):
         def infer(
