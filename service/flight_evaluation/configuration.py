@@ -11,6 +11,10 @@ WIDTH_PX, HEIGHT_PX = 320, 160
 FRAMES_PER_S = 10.0
 """Slower than the service flies with: ten is the least that a vehicle can be trusted with."""
 MARGIN = MARGIN_M
+_ARMING: dict[Flavor, dict[str, float]] = {
+    "ardupilot": {"ARMING_SKIPCHK": -1.0},
+    "px4": {},
+}
 BAND = HeightBand(BELOW_M, ABOVE_M)
 
 
@@ -33,6 +37,5 @@ def settings_for(model: str) -> Settings:
 
 
 def parameters_for(flavor: Flavor) -> dict[str, float]:
-    """The demo's autopilot parameters; armed before anything is sent, as a pilot would who waits."""
-    more = {"ARMING_SKIPCHK": -1.0} if flavor == "ardupilot" else {}
-    return {**PARAMETERS[flavor], **more}
+    """The demo's autopilot parameters; ArduPilot arms before the service has spoken."""
+    return {**PARAMETERS[flavor], **_ARMING[flavor]}

@@ -10,7 +10,7 @@ from service.flight_evaluation.closed_loop import Flown, fly_route
 from service.flight_evaluation.configuration import settings_for
 from service.flight_evaluation.plan import EvaluationPlan
 from service.flight_evaluation.poses import trajectories
-from service.flight_evaluation.routes import Route, find_approaches, find_corridors
+from service.flight_evaluation.routes import Route, find_approaches, find_corridors, find_viewpoints
 from service.flight_evaluation.sight import DepthKind, Eyes
 from service.flight_evaluation.survey import Looked, Surveyor
 from service.flight_evaluation.turning import bearing_errors_deg
@@ -93,12 +93,12 @@ class Evaluation:
                 ways = find_approaches(scene, plan.seed, approach + missing[0])
                 free = find_corridors(scene, plan.seed, corridor + missing[1])
                 missing = [approach + missing[0] - len(ways), corridor + missing[1] - len(free)]
-                places = ways or find_approaches(scene, plan.seed, 1)
+                places = find_viewpoints(scene, plan.seed, turns)
                 for kind in plan.kinds:
                     evidence = self.evidence[kind][name]
                     parts = (
                         self._open(evidence, spec, scene, poses, flights),
-                        self._turns(evidence, scene, places, turns),
+                        self._turns(evidence, scene, places),
                         self._approaches(evidence, scene, ways),
                         self._corridors(evidence, scene, free),
                     )
@@ -119,15 +119,15 @@ class Evaluation:
             yield f"{trajectory.manoeuvre}"
             evidence.looked += surveyor.flight(trajectory)
 
-    def _turns(self, evidence: Evidence, scene: Scene, places: list[Route], turns: int) -> Iterator[str]:
-        for number in range(min(turns, turns * len(places))):
+    def _turns(self, evidence: Evidence, scene: Scene, places: list[Route]) -> Iterator[str]:
+        for number, place in enumerate(places):
             yield "turning on the spot"
             evidence.bearing_errors_deg += bearing_errors_deg(
                 scene,
                 self.settings,
                 self._next_flavor(),
                 Eyes(self.settings, evidence.kind),
-                places[number % len(places)],
+                place,
                 self.plan.latency_s,
                 _TURN_SHARES[number % len(_TURN_SHARES)],
             )

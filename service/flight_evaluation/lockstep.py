@@ -31,7 +31,10 @@ from uavdepth.scenes import Scene
 
 STEP_S = 0.01
 _CLIMB_S = 20.0
-_NEAR_HEIGHT_M = 0.3
+_ABOVE_M, _BELOW_M = 0.3, 0.1
+"""The take-off goes for a little more than the route's height, and is left a little below it: a climb that
+is asked for the height itself ends short of it."""
+
 _BOOT_S = 60.0
 _FULL_STICK_MPS: dict[Flavor, float] = {
     "ardupilot": ARDUPILOT_DEFAULTS["LOIT_SPEED_MS"],
@@ -118,9 +121,9 @@ class Lockstep:
         controller = self.controller
         if self._flavor == "ardupilot":
             controller.set_mode("GUIDED")
-        if controller.arm() != 0 or controller.takeoff(self._route.height_m) != 0:
+        if controller.arm() != 0 or controller.takeoff(self._route.height_m + _ABOVE_M) != 0:
             raise LockstepError(f"the fake {self._flavor} does not take off: {list(controller.texts)}")
-        while controller.height_m < self._route.height_m - _NEAR_HEIGHT_M:
+        while controller.height_m < self._route.height_m - _BELOW_M:
             if controller.now_s > _CLIMB_S or controller.collided:
                 raise LockstepError(
                     f"{self._route.height_m:.1f} m not reached within {_CLIMB_S:g} s: "

@@ -88,7 +88,8 @@ def _figures(kind: DepthKind, parts: Sequence[Evidence]) -> dict[str, Any]:
         **_elements(looked),
         "scale_error_median": _percentile(scales, 50),
         "scale_error_p95": _percentile(scales, 95),
-        "bearing_error_p95_deg": _percentile(errors, 95),
+        "bearing_error_p95_deg": _percentile([abs(error) for error in errors], 95),
+        "bearing_error_median_deg": _percentile(errors, 50),
         "bearing_messages": len(errors),
         "approaches": _approaches(approaches),
         "approaches_by_autopilot": {

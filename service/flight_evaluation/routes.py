@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from service.fake_autopilot.controller import VEHICLE_RADIUS_M
 from service.flight_evaluation.configuration import BAND
 from uavdepth.scenes import Scene
 
@@ -35,10 +36,15 @@ _SOLID = 0.3
 
 _THICK_M = 2.0
 _START_CLEARANCE_M = 1.6
-_SETTLED_M = 5.0
-"""The way that is free on both sides at the start of an approach, so that it begins at full speed."""
+_FRONT_M = 3.0
+"""Nothing stands beside an approach but near its end, so that it is this obstacle that is stopped for."""
 
-_BESIDE_M = 3.0
+_BESIDE_M = 2.5
+_WAY_CLEARANCE_M = 1.7
+_EDGES, _EDGES_M = 4, (3.0, 14.0)
+_HAND_M = 0.12
+_SIDE_M, _SIDE_HEIGHT_M = 1.2, 0.5
+_DEEP_M, _OBLIQUE_M = 0.8, 0.5
 _BAND_MARGIN_M, _OVER_GROUND_M = 0.1, 0.35
 _TRIES = 6000
 
@@ -76,6 +82,11 @@ def find_corridors(scene: Scene, seed: int, count: int) -> list[Route]:
     return routes
 
 
+def find_viewpoints(scene: Scene, seed: int, count: int) -> list[Route]:
+    """`count` places whose outline ahead has edges: something near with something far beside it."""
+    return _find(scene, np.random.default_rng([seed, 0x1EE7]), count, partial(_seen_edges, scene))
+
+
 def _find(
     scene: Scene, rng: np.random.Generator, count: int, length_m: Callable[[Route], float | None]
 ) -> list[Route]:
@@ -103,21 +114,73 @@ def _way_to_obstacle(scene: Scene, place: Route) -> float | None:
     met = (reach <= nearest + _THICK_M).reshape(aside.shape)
     # A wire meets few of the rays, but all across the front; bare ground that rises is no obstacle to find.
     is_solid = bool(met.mean() >= _SOLID) or bool(met.any(axis=0).all())
-    if not is_solid or _is_gentle_ground(scene, place, nearest):
+    if not is_solid or not _closes_the_way(scene, place, nearest) or _is_gentle_ground(scene, place, nearest):
         return None
-    return nearest if _free_m(scene, place, _BESIDE_M) >= _SETTLED_M else None
+    if _free_m(scene, place, _BESIDE_M) < nearest - _FRONT_M or not _would_hit(scene, place, nearest):
+        return None
+    return nearest
+
+
+def _closes_the_way(scene: Scene, place: Route, ahead_m: float) -> bool:
+    """Whether it stands across the way, and wide: PX4 slides along what it meets obliquely (measured)."""
+    sides, heights = np.array([-_SIDE_M, _SIDE_M]), np.linspace(-_SIDE_HEIGHT_M, _SIDE_HEIGHT_M, 41)
+    aside, up = np.meshgrid(sides, heights)
+    left_m, right_m = _cast(scene, place, aside.ravel(), up.ravel()).reshape(aside.shape).min(axis=0)
+    deep = max(abs(left_m - ahead_m), abs(right_m - ahead_m))
+    return bool(deep < _DEEP_M and abs(left_m - right_m) < _OBLIQUE_M)
+
+
+def _would_hit(scene: Scene, place: Route, ahead_m: float) -> bool:
+    """Whether flying on hits something, be it a hand's breadth beside the way or over it."""
+    down_m = -scene.ground_height_m(place.north_m, place.east_m) - place.height_m
+    cosine, sine = math.cos(place.yaw_rad), math.sin(place.yaw_rad)
+    ways = ahead_m + np.arange(0.0, _THICK_M, 0.1)
+    nearest = min(
+        scene.clearance_m((place.north_m + cosine * way, place.east_m + sine * way, down_m)) for way in ways
+    )
+    return nearest < VEHICLE_RADIUS_M - _HAND_M
 
 
 def _free_way(scene: Scene, half_m: float, place: Route) -> float | None:
-    return CORRIDOR_M if _free_m(scene, place, half_m) >= CORRIDOR_M + _BEYOND_M else None
+    if _free_m(scene, place, half_m) < CORRIDOR_M + _BEYOND_M:
+        return None
+    # A wire along the way meets none of the rays along it.
+    down_m = -scene.ground_height_m(place.north_m, place.east_m) - place.height_m
+    cosine, sine = math.cos(place.yaw_rad), math.sin(place.yaw_rad)
+    for way_m in np.arange(0.0, CORRIDOR_M + _BEYOND_M, 1.0):
+        position = (place.north_m + cosine * way_m, place.east_m + sine * way_m, down_m)
+        if scene.clearance_m(position) < _WAY_CLEARANCE_M:
+            return None
+    return CORRIDOR_M
+
+
+def _seen_edges(scene: Scene, place: Route) -> float | None:
+    """Distance of the nearest thing ahead, if the outline has edges enough; None if it has not."""
+    down_m = -scene.ground_height_m(place.north_m, place.east_m) - place.height_m
+    bearings = place.yaw_rad + np.radians(np.arange(-45.0, 45.1, 2.5))
+    reach = np.full(len(bearings), math.inf)
+    for up_m in (-1.0, 0.0, 1.0):
+        fan = np.stack([np.cos(bearings), np.sin(bearings), 0.0 * bearings], axis=1)
+        origin = np.array([place.north_m, place.east_m, down_m - up_m])
+        reach = np.minimum(reach, scene.ray_distance_m(origin, fan))
+    reach = np.minimum(reach, 20.0)
+    edges = np.count_nonzero(np.abs(np.diff(np.log(np.maximum(reach, 0.1)))) > math.log(1.5))
+    near_m = float(reach.min())
+    return near_m if edges >= _EDGES and _EDGES_M[0] <= near_m <= _EDGES_M[1] else None
 
 
 def _free_m(scene: Scene, place: Route, half_m: float) -> float:
     """How far a box round the way is free: so wide to each side, and as high as the height band."""
     lowest_m = -min(BAND.below_m + _BAND_MARGIN_M, place.height_m - _OVER_GROUND_M)
-    heights = np.linspace(lowest_m, BAND.above_m + _BAND_MARGIN_M, 17)
-    aside, up = np.meshgrid(np.linspace(-half_m, half_m, 21), heights)
-    return float(_cast(scene, place, aside.ravel(), up.ravel()).min())
+    highest_m = BAND.above_m + _BAND_MARGIN_M
+    free_m = math.inf
+    # Coarsely first; then close enough together for poles, and for wires.
+    for across, along in ((9, 5), (round(2 * half_m / 0.1), 5), (5, round((highest_m - lowest_m) / 0.03))):
+        aside, up = np.meshgrid(np.linspace(-half_m, half_m, across), np.linspace(lowest_m, highest_m, along))
+        free_m = min(free_m, float(_cast(scene, place, aside.ravel(), up.ravel()).min()))
+        if free_m < _FRONT_M:
+            break
+    return free_m
 
 
 def _cast(

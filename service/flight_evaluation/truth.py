@@ -162,8 +162,9 @@ class TruthFinder:
         slope = np.zeros(len(points))
         slope[bare] = _slope_deg(world, points[bare])
         tolerance = max(GROUND_FLOOR_M, GROUND_DEPTH_SHARE * height_m) + GROUND_SLOPE * range_m + 0.1
-        rise_deg = np.degrees(np.arctan2(height_m - down, range_m))
-        steep = bare & (slope > STEEP_SLOPE_DEG) & (rise_deg > STEEP_SLOPE_DEG)
+        # Whoever calls gentle slopes ground cannot tell where a steep one begins before it rises above them.
+        gentle_rise_m = math.tan(math.radians(GENTLE_SLOPE_DEG)) * range_m
+        steep = bare & (slope > STEEP_SLOPE_DEG) & (height_m - down > tolerance + gentle_rise_m)
         thing = over > tolerance
         certain = (
             (thing | steep)

@@ -45,7 +45,7 @@ def bearing_errors_deg(
         share: of the stick, 0 to 1.
 
     Returns:
-        One error for each message whose outline has edges, in degrees.
+        Degrees by which each message whose outline has edges is turned clockwise against the true one.
     """
     flight = Lockstep(scene, settings, flavor, eyes, route, latency_s)
     flight.take_off()
@@ -69,7 +69,8 @@ def bearing_errors_deg(
 def outline_turn_deg(
     scene: Scene, words: ObstacleWords, position_ned_m: Sequence[float], yaw_rad: float
 ) -> float | None:
-    """Degrees by which a message's outline is turned against the true one; None where nothing tells it.
+    """Degrees by which a message's outline is turned clockwise against the true one; None where nothing tells
+    it.
 
     Args:
         scene: the world.
@@ -93,15 +94,16 @@ def outline_turn_deg(
     if np.count_nonzero(edges) < _FEWEST_EDGES:
         return None
     turns = np.arange(-_LARGEST_DEG, _LARGEST_DEG + 1e-9, _STEP_DEG)
-    costs = np.array(
-        [
-            np.mean(np.abs(np.log(np.maximum(told, 0.2) / _elements_of(outline, bearings + turn))))
-            for turn in turns
-        ]
-    )
+    costs = np.array([_misfit(told, _elements_of(outline, bearings - turn)) for turn in turns])
     # Elements are 5 degrees wide: of turns that fit equally well the middle one is meant.
     best = turns[costs <= costs.min() + 1e-3]
-    return float(abs(np.mean(best)))
+    return float(np.mean(best))
+
+
+def _misfit(told_m: NDArray[np.float64], true_m: NDArray[np.float64]) -> float:
+    """Mean difference of the logarithms, but for a factor common to all: scale is judged elsewhere."""
+    difference = np.log(np.maximum(told_m, 0.2) / true_m)
+    return float(np.mean(np.abs(difference - np.median(difference))))
 
 
 def _outline(

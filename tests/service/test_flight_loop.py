@@ -85,4 +85,4 @@ class TestTurning:
             nearest_m = float(world.ray_distance_m(np.array([0.0, 0.0, -3.0]), aim).min())
             words[(bearing_deg + 155) // 5] = int(min(100 * nearest_m, 2001))
         error = outline_turn_deg(world, ObstacleWords(words), (0.0, 0.0, -3.0), 0.0)
-        assert error == pytest.approx(abs(turned_deg), abs=1.5)
+        assert error == pytest.approx(turned_deg, abs=1.5)
