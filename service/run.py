@@ -267,14 +267,16 @@ class Service:
             self._link.say(SEVERITY_WARNING, remark)
 
     def _stands_ready(self, result: PerceptionResult) -> bool:
-        """Whether all is well but the vehicle stands: disarmed, and too low to tell the scale.
+        """Whether all is well but the vehicle stands: disarmed, and too low or too still to tell the scale.
 
-        In the air, and where no rangefinder is heard, the same lack is a reason for silence.
+        In the air, and where nobody could tell the height after take-off, the same lack is silence.
         """
-        if result.trouble not in (Trouble.NO_HEIGHT, Trouble.NO_GROUND):
+        if result.trouble is None or not result.trouble.is_lack_of_scale:
             return False
-        rangefinder_hz = self._link.status().rates_hz.get("DISTANCE_SENSOR", 0.0)
-        return result.telemetry.armed is False and rangefinder_hz > 0
+        by_ekf = self._settings.scale.height_source != "rangefinder"
+        knows_height = by_ekf and result.telemetry.position_ned_m is not None
+        knows_height = knows_height or self._link.status().rates_hz.get("DISTANCE_SENSOR", 0.0) > 0
+        return result.telemetry.armed is False and knows_height
 
     def _model_card(self) -> str | None:
         card = None if self._perception is None else self._perception.model_card

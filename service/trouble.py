@@ -30,6 +30,15 @@ class Trouble(Enum):
         """Whether a part of the service has failed, as against a vehicle that is where depth has no scale."""
         return self in _FAULTS
 
+    @property
+    def is_lack_of_scale(self) -> bool:
+        """Whether metres are missing, as they may where a vehicle stands on the ground."""
+        return self in _LACKS_OF_SCALE
+
+
+_LACKS_OF_SCALE = frozenset(
+    {Trouble.NO_HEIGHT, Trouble.NO_GROUND, Trouble.NO_POINTS, Trouble.BAD_SCALE, Trouble.OLD_SCALE}
+)
 
 _FAULTS = frozenset(
     {

@@ -147,6 +147,14 @@ def test_on_the_ground_the_autopilot_hears_that_the_sensor_lives_and_no_distance
         assert run.service.status().obstacle_messages == 0
 
 
+def test_a_vehicle_that_has_its_height_from_the_ekf_can_be_armed_too() -> None:
+    settings = make_settings("scale.height_source=both")
+    on_ground: dict[str, Any] = {"height_m": None, "position_ned_m": (0.0, 0.0, 0.0), "rangefinder_hz": 0.0}
+    with running(settings=settings, armed=False, **on_ground) as run:
+        wait_until(lambda: len(run.link.sent) >= 3)
+        assert all(np.all(scan.state == SectorState.UNKNOWN) for scan, _ in run.link.sent)
+
+
 @pytest.mark.parametrize(
     "link_values", [{"armed": True}, {"armed": None}, {"armed": False, "rangefinder_hz": 0.0}]
 )
