@@ -72,7 +72,7 @@ class StreamVehicle:
     @property
     def offered_kbit_per_s(self) -> float:
         """What scans, depth and camera would take in full size."""
-        return self._offered.value
+        return float(self._offered.value)
 
 
 def _rendered_results(count: int = _PICTURES) -> list[PerceptionResult]:

@@ -23,27 +23,34 @@ _UNREPORTED_NS: Final = 2_000_000_000
 _LOST_NS: Final = 1_500_000_000
 """So long without a report while pictures are sent: they do not arrive."""
 
-_HIGH_NS: Final = 100_000_000
+_HIGH_NS: Final = 80_000_000
 """Waiting in queues, beyond the shortest delay seen, at which the budget shrinks. Scans share the queue and
 are to be 150 ms late at most."""
 
-_LOW_NS: Final = 50_000_000
+_LOW_NS: Final = 40_000_000
 """Waiting below which the budget grows."""
 
 _GROWTH: Final = 0.06
 """With each report."""
 
 _CAREFUL_GROWTH: Final = 0.004
+_PROBING: Final = 0.02
 _CAREFUL_NS: Final = 8_000_000_000
-"""Growth near the rate that was too much last, and for how long after that."""
+"""Growth near the rate that was too much last, for how long, and growth there after that."""
 
 _NEAR: Final = 0.9
+_FAR: Final = 3.0
+"""Between these parts of the rate that was too much last it is near."""
+
 _RETREAT: Final = 0.85
 _DEEPEST: Final = 0.7
 """Least of the budget that one retreat believes to have arrived: one report counts few pictures."""
 
 _STANDING: Final = 3
-"""Reports in a row that must tell of waiting."""
+"""Reports in a row that must tell of waiting; of long waiting (twice `_HIGH_NS`) two do."""
+
+_WINDOW_S: Final = 0.5
+"""What may be on its way, in seconds of the budget: bounds the queue of a link that gets slower."""
 
 _BASE_WINDOW_NS: Final = 20_000_000_000
 _MAX_SENT = 256
@@ -70,10 +77,21 @@ class PictureBudget:
         self._last_report_ns: int | None = None
         self._shrunk_ns: int | None = None
         self._delays: deque[tuple[int, int]] = deque()
+        self._flying: deque[tuple[int, int]] = deque()
+        self._flying_bytes = 0
         self._stations: OrderedDict[str, deque[int]] = OrderedDict()
 
-    def sent(self, topic: str, index: int, now_ns: int) -> None:
+    @property
+    def has_room(self) -> bool:
+        """Whether another picture may be on its way."""
+        return self._last_report_ns is None or self._flying_bytes <= _WINDOW_S * self.bytes_per_s
+
+    def sent(self, topic: str, index: int, size_bytes: int, now_ns: int) -> None:
         """A picture was handed to the link."""
+        self._flying.append((now_ns, size_bytes))
+        self._flying_bytes += size_bytes
+        while len(self._flying) > _MAX_SENT:
+            self._flying_bytes -= self._flying.popleft()[1]
         self._sent[topic, index] = now_ns
         while len(self._sent) > _MAX_SENT:
             self._sent.popitem(last=False)
@@ -97,10 +115,12 @@ class PictureBudget:
         while len(self._stations) > _MAX_STATIONS:
             self._stations.popitem(last=False)
         self._last_report_ns = now_ns
+        while self._flying and self._flying[0][0] <= sent_ns:
+            self._flying_bytes -= self._flying.popleft()[1]
         delay_ns = max(0, now_ns - sent_ns - round(report.age_ms * 1e6))
         self.delay_ms = delay_ns / 1e6
         waits.append(delay_ns - self._base_ns(delay_ns, now_ns))
-        if len(waits) == _STANDING and min(waits) > _HIGH_NS:
+        if _stands(waits):
             waits.clear()
             arrived = 1e3 * report.size_bytes / max(report.interval_ms, 100.0)
             self._too_much = min(self.bytes_per_s, max(arrived, _DEEPEST * self.bytes_per_s))
@@ -111,9 +131,12 @@ class PictureBudget:
             self._set(self.bytes_per_s * (1 + self._growth(now_ns) / len(self._stations)))
 
     def _growth(self, now_ns: int) -> float:
-        if self._too_much is None or self._shrunk_ns is None or now_ns - self._shrunk_ns > _CAREFUL_NS:
+        if self._too_much is None or self._shrunk_ns is None:
             return _GROWTH
-        return _CAREFUL_GROWTH if self.bytes_per_s > _NEAR * self._too_much else _GROWTH
+        if not _NEAR * self._too_much < self.bytes_per_s < _FAR * self._too_much:
+            return _GROWTH
+        is_early = now_ns - self._shrunk_ns <= _CAREFUL_NS
+        return _CAREFUL_GROWTH if is_early else _PROBING
 
     def tick(self, now_ns: int) -> None:
         """Notice reports that do not come."""
@@ -125,6 +148,8 @@ class PictureBudget:
             return
         if now_ns - max(self._last_report_ns, self._shrunk_ns or 0) > _LOST_NS:
             self._shrunk_ns = now_ns
+            self._flying.clear()
+            self._flying_bytes = 0
             self._set(self.bytes_per_s / 2)
 
     def _base_ns(self, delay_ns: int, now_ns: int) -> int:
@@ -139,3 +164,11 @@ class PictureBudget:
 
     def _set(self, bytes_per_s: float) -> None:
         self.bytes_per_s = min(max(bytes_per_s, min(_MIN_BYTES_PER_S, self._limit)), self._limit)
+
+
+def _stands(waits: deque[int]) -> bool:
+    """Whether a queue stands, by what the last reports say of waiting, newest last."""
+    newest = list(waits)
+    return (len(newest) >= _STANDING and min(newest) > _HIGH_NS) or (
+        len(newest) >= 2 and min(newest[-2:]) > 2 * _HIGH_NS
+    )

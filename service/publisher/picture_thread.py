@@ -176,7 +176,7 @@ class PictureThread:
             now_ns = self._clock.now_ns()
             if self._last.get(topic) is result or not self._watched.get(topic):
                 continue
-            if not self._pacer.allows(topic, now_ns):
+            if not (self._pacer.allows(topic, now_ns) and self.budget.has_room):
                 self._held_back = True
                 continue
             if not limit.allows(now_ns):
@@ -190,5 +190,5 @@ class PictureThread:
                 topics.put(topic, picture.payload, attachment)
             self.samples += 1
             size_bytes = len(picture.payload) + len(attachment)
-            self.budget.sent(topic, picture.header.index, now_ns)
+            self.budget.sent(topic, picture.header.index, size_bytes, now_ns)
             self._pacer.sent(topic, size_bytes, self.budget.bytes_per_s, now_ns)

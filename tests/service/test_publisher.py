@@ -7,6 +7,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,11 +18,14 @@ from service.clock import ManualClock, MonotonicClock
 from service.errors import PublisherError
 from service.frame import Frame
 from service.pipeline import PerceptionResult, unknown_scan
+from service.publisher.picture_receiver import PictureReceiver
 from service.publisher.publisher import ZenohPublisher
-from service.publisher.session import open_session
+from service.publisher.session import Role, open_session
 from service.publisher.wire import CameraHeader, DepthHeader, ScanSample, StatusSample
 from service.scale_status import ScaleStatus
+from service.security.errors import SecurityError
 from service.settings import Settings
+from service.settings.zenoh import ZenohSettings
 from service.telemetry import Telemetry
 from service.trouble import Trouble
 from uavdepth.depth_codec import decode_depth_png
@@ -121,6 +125,83 @@ def test_a_ground_station_gets_scan_depth_camera_and_status() -> None:
         assert camera.attachment is not None
         assert CameraHeader.decode(camera.attachment.to_bytes()).camera.width == settings.camera.width
         assert camera.payload.to_bytes()[:2] == b"\xff\xd8"
+
+
+def test_a_thin_stream_arrives_as_pictures_that_any_browser_shows() -> None:
+    port = free_port()
+    settings = settings_on(port, "zenoh.profile=thin", "zenoh.camera=false")
+    heard: list[tuple[str, bytes, bytes | None]] = []
+    with publishing(settings) as publisher, open_session([], [f"tcp/127.0.0.1:{port}"]) as session:
+        receiver = PictureReceiver(session, "kite", lambda *sample: heard.append(sample), MonotonicClock())
+        index = 0
+
+        def offer() -> bool:
+            nonlocal index
+            index += 1
+            publisher.offer(result_of(settings, index))
+            return bool(heard) and publisher.status.picture_delay_ms is not None
+
+        wait_until(offer)
+        receiver.close()
+    key, png, attachment = heard[0]
+    assert key == "uavdepth/kite/depth"
+    header = DepthHeader.decode(attachment or b"")
+    metres = decode_depth_png(png, header.near_m, header.far_m)
+    truth = wall_over_ground(settings.camera.model, 8.0)
+    assert metres.shape == truth.shape
+    np.testing.assert_allclose(np.median(metres / truth), 1.0, atol=0.05)
+
+
+def test_scan_only_sends_no_pictures() -> None:
+    port = free_port()
+    settings = settings_on(port, "zenoh.profile=scan-only")
+    with publishing(settings) as publisher, listening(port) as heard:
+
+        def offer() -> bool:
+            publisher.offer(result_of(settings))
+            return len(heard.samples.get("scan", [])) >= 5
+
+        wait_until(offer)
+        assert set(heard.samples) == {"scan"}
+
+
+def test_a_vehicle_that_connects_has_a_session_for_scans_and_one_for_pictures() -> None:
+    port = free_port()
+    settings = settings_on(port, "zenoh.listen=[]", f"zenoh.connect=['tcp/127.0.0.1:{port}']")
+    with open_session([f"tcp/127.0.0.1:{port}"], [], None, Role.STATION) as station:
+        heard = Heard(station)
+        with publishing(settings) as publisher:
+
+            def offer() -> bool:
+                publisher.offer(result_of(settings))
+                return heard.has("scan", "depth", "camera")
+
+            wait_until(offer)
+            assert len(list(station.info.peers_zid())) == 2
+
+
+def test_what_is_not_understood_as_a_report_changes_nothing() -> None:
+    port = free_port()
+    settings = settings_on(port)
+    with publishing(settings) as publisher, listening(port) as heard:
+        wait_until(lambda: heard.alive == [True])
+        with open_session([], [f"tcp/127.0.0.1:{port}"]) as hostile:
+            for data in (b"", b"{}", b"[" * 60_000, b"\xff" * 1000):
+                hostile.put("uavdepth/kite/received", data)
+
+            def offer() -> bool:
+                publisher.offer(result_of(settings))
+                return heard.has("scan", "depth")
+
+            wait_until(offer)
+        assert publisher.status.detail == ""
+
+
+def test_certificates_that_cannot_be_used_stop_the_program_with_the_file(tmp_path: Path) -> None:
+    table = {name: str(tmp_path / name) for name in ("ca", "certificate", "key")}
+    settings = ZenohSettings(listen=("tls/127.0.0.1:7447",), **table)
+    with pytest.raises(SecurityError, match=r"ca .*: no such file"):
+        ZenohPublisher(settings, "kite", make_settings().camera.model, MonotonicClock())
 
 
 def test_liveliness_goes_with_the_publisher() -> None:
