@@ -10,7 +10,7 @@ from typing import Final
 from service.ground.documents import detail_document, history_document
 from service.ground.errors import GroundError
 from service.ground.frames import FrameKind, encode_frame
-from service.ground.hub import Hub
+from service.ground.hub import FLEET_PERIOD_S, Hub
 from service.publisher import keys
 
 WINDOW: Final = 2
@@ -25,6 +25,7 @@ MAX_MESSAGE_BYTES: Final = 1024
 _PICTURES = {FrameKind.CAMERA: keys.CAMERA, FrameKind.DEPTH: keys.DEPTH}
 _ORDER = (FrameKind.HISTORY, FrameKind.DETAIL, FrameKind.FLEET, FrameKind.CAMERA, FrameKind.DEPTH)
 _MAX_NAME = 64
+_HISTORY_TICKS = round(5.0 / FLEET_PERIOD_S)
 
 
 class BrowserStalledError(GroundError):
@@ -132,7 +133,8 @@ class Browser:
         if self.vehicle is None:
             return None
         if kind is FrameKind.HISTORY:
-            return 1
+            # Again from time to time, so that what a slow browser left out does not stay a gap.
+            return 1 + self._hub.fleet_number // _HISTORY_TICKS
         if kind is FrameKind.DETAIL:
             return self._hub.fleet.changes(self.vehicle)
         picture = self._hub.fleet.picture(self.vehicle, _PICTURES[kind])

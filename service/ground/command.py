@@ -49,6 +49,8 @@ def ground(
     ] = None,
 ) -> None:
     """Serve a page that shows every vehicle live."""
+    from contextlib import suppress
+
     from service.ground.station import Station, StationSettings
 
     settings = StationSettings.checked(
@@ -66,4 +68,5 @@ def ground(
         if give_up_s is not None:
             station.await_peer(give_up_s)
         typer.echo(station.words)
-        station.serve()
+        with suppress(KeyboardInterrupt):  # uvicorn raises it again when everything is closed
+            station.serve()

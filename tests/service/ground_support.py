@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 
 import cv2
@@ -13,7 +13,7 @@ import uvicorn
 import zenoh
 from program_fakes import free_port, wait_until
 
-from service.clock import Clock, MonotonicClock
+from service.clock import MonotonicClock
 from service.ground.access import Access
 from service.ground.app import GroundApp
 from service.ground.fleet import Fleet
@@ -188,16 +188,24 @@ class RunningStation:
 
 
 @contextmanager
-def station(token: str | None = None, clock: Clock | None = None) -> Iterator[RunningStation]:
-    """A ground station on the loopback, connected to a session that vehicles may use."""
+def station(token: str | None = None, *, listens: bool = False) -> Iterator[RunningStation]:
+    """A ground station on the loopback, and a session that vehicles may use.
+
+    Args:
+        token: asked for by the page.
+        listens: the vehicles connect to the station, not the station to them.
+    """
     endpoint = f"tcp/127.0.0.1:{free_port()}"
-    clock = MonotonicClock() if clock is None else clock
+    clock = MonotonicClock()
     fleet = Fleet(clock)
-    with (
-        bind("127.0.0.1", 0) as server_socket,
-        open_session([endpoint], []) as vehicles,
-        FleetListener([], [endpoint], fleet, clock) as listener,
-    ):
+    with ExitStack() as stack:
+        server_socket = stack.enter_context(bind("127.0.0.1", 0))
+        if listens:
+            listener = stack.enter_context(FleetListener([endpoint], [], fleet, clock))
+            vehicles = stack.enter_context(open_session([], [endpoint]))
+        else:
+            vehicles = stack.enter_context(open_session([endpoint], []))
+            listener = stack.enter_context(FleetListener([], [endpoint], fleet, clock))
         port: int = server_socket.getsockname()[1]
         hub = Hub(fleet, listener, (endpoint,), clock)
         app = GroundApp(hub, Access(token), port)

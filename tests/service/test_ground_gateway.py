@@ -119,6 +119,16 @@ def test_a_browser_gets_fleet_detail_history_and_pictures(open_station: RunningS
     kite.die()
 
 
+def test_vehicles_may_connect_to_the_station() -> None:
+    with station(listens=True) as running:
+        gull = Vehicle(running.vehicles, "gull")
+        with Talk(gull.say), page(running) as browser:
+            browser.watch("gull")
+            while browser.document(FrameKind.DETAIL)["nearest_cm"] != 600:
+                pass
+            browser.take_until(FrameKind.DEPTH)
+
+
 def test_pictures_are_fetched_only_while_somebody_looks(open_station: RunningStation) -> None:
     heron = Vehicle(open_station.vehicles, "heron")
     with Talk(heron.say):

@@ -23,7 +23,7 @@ function scale(s) {
 
 function latency(s) {
   if (!isNumber(s.latency_ms_p50)) return [DASH, "capture to autopilot"];
-  const delay = isNumber(s.cp_delay_s) ? `, CP_DELAY\u00a0${fixed(s.cp_delay_s, 2)}\u00a0s` : "";
+  const delay = isNumber(s.cp_delay_s) ? `, CP_DELAY\u00a0${fixed(s.cp_delay_s, 2)}` : "";
   return [`${fixed(s.latency_ms_p50, 0)} ms`, `95 %: ${fixed(s.latency_ms_p95, 0)} ms${delay}`];
 }
 

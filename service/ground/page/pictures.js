@@ -6,17 +6,18 @@ const INVALID = 0;
 const NEARER = 1;
 const LEVELS = 253; // of the codec: codes 2 to 255, logarithmic from near to far
 
-/** From near to far: light to dark in every kind of colour vision, after the cividis map. */
+/** From near to far, light to dark in every kind of colour vision: the viridis map, from its light end. */
 const STOPS = [
-  [255, 250, 200],
-  [254, 226, 85],
-  [209, 184, 80],
-  [165, 150, 110],
-  [124, 123, 120],
-  [86, 96, 110],
-  [45, 68, 108],
-  [6, 38, 88],
-  [0, 18, 48],
+  [253, 231, 37],
+  [181, 222, 43],
+  [110, 206, 88],
+  [53, 183, 121],
+  [31, 158, 137],
+  [38, 130, 142],
+  [49, 104, 142],
+  [62, 74, 137],
+  [72, 40, 120],
+  [68, 1, 84],
 ];
 
 function colourAt(share) {
