@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 from functools import lru_cache
 
 import cv2
@@ -23,6 +24,9 @@ FAR_CODE = 255
 _FIRST_LEVEL = NEARER_CODE + 1
 _LEVELS = FAR_CODE - _FIRST_LEVEL
 """253 logarithmic levels from near_m up to far_m: 2.5 % a level from 0.2 to 100 m."""
+
+_MAX_PIXELS = 16_777_216
+_PNG_START = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR"
 
 _PNG_OPTIONS = (cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE)
 """Measured: smaller and faster than every compression level with the default strategy."""
@@ -64,9 +68,11 @@ def decode_depth_png(data: bytes, near_m: float, far_m: float) -> NDArray[np.flo
         else the lower edge of the level.
 
     Raises:
-        DepthCodecError: data that is not an 8-bit grey PNG, or an impossible span.
+        DepthCodecError: data that is not an 8-bit grey PNG, one of more than 16,777,216 pixels, or an
+            impossible span.
     """
     edges = depth_code_edges_m(near_m, far_m)
+    _check_size(data)
     buffer = np.frombuffer(data, dtype=np.uint8)
     try:
         codes = cv2.imdecode(buffer, cv2.IMREAD_UNCHANGED) if buffer.size else None
@@ -77,6 +83,14 @@ def decode_depth_png(data: bytes, near_m: float, far_m: float) -> NDArray[np.flo
     if codes.dtype != np.uint8 or codes.ndim != 2:
         raise DepthCodecError(f"the picture is {codes.dtype} {codes.shape}: an 8-bit grey one is needed")
     return np.asarray(cv2.LUT(codes, edges), dtype=np.float32)
+
+
+def _check_size(data: bytes) -> None:
+    """Refuse a PNG that claims to be huge before anything of that size is reserved."""
+    if data.startswith(_PNG_START) and len(data) >= len(_PNG_START) + 8:
+        width, height = struct.unpack_from(">II", data, len(_PNG_START))
+        if width * height > _MAX_PIXELS:
+            raise DepthCodecError(f"the picture has {width}x{height} pixels: at most {_MAX_PIXELS} are read")
 
 
 def depth_codes(depth_m: NDArray[np.floating], near_m: float, far_m: float) -> NDArray[np.uint8]:

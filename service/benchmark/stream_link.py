@@ -65,9 +65,10 @@ class SlowLink:
     def __init__(self, port: int, settings: LinkSettings) -> None:
         self._target = port
         self._settings = settings
-        self._loop = asyncio.new_event_loop()
         self._to_ground, self._to_vehicle = _Way(settings), _Way(settings)
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._loop: asyncio.AbstractEventLoop
+        self._stop: asyncio.Event
+        self._up = threading.Event()
         self._socket = socket.socket()
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _SOCKET_BUFFER_BYTES)
         self._socket.bind(("127.0.0.1", 0))
@@ -91,27 +92,24 @@ class SlowLink:
 
     def __enter__(self) -> Self:
         self._thread.start()
+        self._up.wait()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._loop.call_soon_threadsafe(self._stop.set)
         self._thread.join()
 
     def _run(self) -> None:
-        asyncio.set_event_loop(self._loop)
-        server = self._loop.run_until_complete(
-            asyncio.start_server(self._serve, sock=self._socket, limit=_PACKET_BYTES)
-        )
-        try:
-            self._loop.run_forever()
-        finally:
-            server.close()
-            for task in asyncio.all_tasks(self._loop):
-                task.cancel()
-            self._loop.run_until_complete(asyncio.sleep(0))
-            self._loop.close()
+        asyncio.run(self._relay())
+
+    async def _relay(self) -> None:
+        self._loop, self._stop = asyncio.get_running_loop(), asyncio.Event()
+        server = await asyncio.start_server(self._serve, sock=self._socket, limit=_PACKET_BYTES)
+        self._up.set()
+        await self._stop.wait()
+        server.close()
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         upstream = socket.socket()
@@ -145,6 +143,9 @@ class SlowLink:
                 if not data:
                     break
                 arrivals.put_nowait((way.take(len(data)), data))
+            # What is still on the air arrives before the end does.
+            arrivals.put_nowait((0.0, b""))
+            await deliver
         finally:
             deliver.cancel()
             writer.close()
@@ -154,6 +155,8 @@ async def _deliver(arrivals: asyncio.Queue[tuple[float, bytes]], writer: asyncio
     loop = asyncio.get_running_loop()
     while True:
         at_s, data = await arrivals.get()
+        if not data:
+            return
         await asyncio.sleep(at_s - loop.time())
         writer.write(data)
         await writer.drain()

@@ -29,7 +29,7 @@ from uavdepth.scenes import load_scene
 
 FPS = 15.0
 _PICTURES = 4
-_READY_S = 90.0
+_READY_S = 180.0
 _STOP_S = 5.0
 _STATUS_PERIOD = 7
 """One status for so many scans: about two a second."""

@@ -169,3 +169,10 @@ def test_the_information_beside_a_picture_is_plain_json_and_gives_the_camera_bac
     read["distortion"] = tuple(read["distortion"])
     assert DepthPictureInfo(**read) == info
     assert info.camera == camera
+
+
+def test_a_png_that_claims_to_be_huge_is_refused_before_memory_is_taken() -> None:
+    data = bytearray(encode_depth_png(np.ones((4, 4), np.float32), 0.5, 60.0))
+    data[16:24] = (30_000).to_bytes(4, "big") * 2
+    with pytest.raises(DepthCodecError, match="30000x30000 pixels"):
+        decode_depth_png(bytes(data), 0.5, 60.0)
