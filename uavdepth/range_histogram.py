@@ -17,6 +17,12 @@ percent, noise by decades."""
 NEAR_QUANTILE = 0.03
 """Share of the supporting points that may be nearer than the distance reported."""
 
+LINE_ELEMENTS = 3
+"""A line runs through so many neighbouring elements: noise that fills one by chance does not fill three."""
+
+LINE_STEP = 1.35
+"""Ratio of its distances in neighbouring elements: it may cross the way at 70 degrees off square."""
+
 _MANTISSA_SHIFT = 17
 """A positive float32 read as an integer grows like its logarithm; dropping 17 of its 23 mantissa bits
 leaves 64 bins an octave, each 1.1 to 1.6 % wide, at the cost of one shift."""
@@ -89,11 +95,18 @@ class RangeHistogram:
             self._doubted = True
         self._used = end
 
-    def nearest_m(self, needed: NDArray[np.int64]) -> NDArray[np.float32]:
+    def nearest_m(
+        self, needed: NDArray[np.int64], line_needed: NDArray[np.int64] | None = None
+    ) -> NDArray[np.float32]:
         """The nearest distance in each direction that has enough points within `SUPPORT_SPAN` of each other.
+
+        A thing that goes on through `LINE_ELEMENTS` neighbouring elements, such as a wire across the way, is
+        found with fewer: near the vehicle an element is narrow, and a wire shows little of itself in each.
+        Half of them may be nearer than the distance told for it.
 
         Args:
             needed: (bins,) points that make an obstacle at each bin's distance.
+            line_needed: (72,) points that each element must have of such a line.
 
         Returns:
             (72,) float32 distance in metres, rounded down to a bin's edge, and shortened by the mean of what
@@ -114,17 +127,37 @@ class RangeHistogram:
         support -= below[:, :-1]
         doubt = self._summed_doubt(size, rows) if self._doubted else None
         enough = support >= needed
-        starts = enough.argmax(axis=1)
-        for row in np.flatnonzero(enough.any(axis=1)):
+        starts = np.where(enough.any(axis=1), enough.argmax(axis=1), self._bins)
+        least = needed[np.minimum(starts, self._bins - 1)]
+        if line_needed is not None:
+            of_row = line_needed[(rows - _ROWS_TO_FIRST_BEARING) % SECTOR_COUNT]
+            line = self._lines(support >= of_row[:, None], rows)
+            nearer = line < starts
+            starts, least = np.where(nearer, line, starts), np.where(nearer, of_row // 2, least)
+        for row in np.flatnonzero(starts < self._bins):
             start = starts[row]
             quantile = int(NEAR_QUANTILE * support[row, start])
-            rank = below[row, start] + max(int(needed[start]), quantile)
+            rank = below[row, start] + max(int(least[row]), quantile)
             distance = self.edges_m[np.searchsorted(below[row], rank) - 1]
             if doubt is not None:
                 mean = (doubt[row, self._window_end[start]] - doubt[row, start]) / support[row, start]
                 distance *= np.float32(1.0 - mean)
             nearest[(rows[row] - _ROWS_TO_FIRST_BEARING) % SECTOR_COUNT] = distance
         return nearest
+
+    def _lines(self, enough: NDArray[np.bool_], rows: NDArray[np.intp]) -> NDArray[np.intp]:
+        """(rows,) nearest bin of a line through each row and its neighbours; the number of bins for none."""
+        first = np.full(SECTOR_COUNT, self._bins)
+        first[rows] = np.where(enough.any(axis=1), enough.argmax(axis=1), self._bins)
+        distance = np.append(self.edges_m[:-1], np.float32(np.nan))[first]
+        following = np.roll(distance, -1)
+        with np.errstate(invalid="ignore"):
+            joined = np.maximum(distance, following) <= LINE_STEP * np.minimum(distance, following)
+        along = np.zeros(SECTOR_COUNT, dtype=np.bool_)
+        starts = np.logical_and.reduce([np.roll(joined, -step) for step in range(LINE_ELEMENTS - 1)])
+        for step in range(LINE_ELEMENTS):
+            along |= np.roll(starts, step)
+        return np.asarray(np.where(along, first, self._bins)[rows], dtype=np.intp)
 
     def _summed_doubt(self, size: int, rows: NDArray[np.intp]) -> NDArray[np.float64]:
         """(rows, bins + 1) shortening of all points below each bin."""

@@ -25,6 +25,10 @@ SMALLEST_SIZE_M = 0.25
 SMALLEST_AREA_M2 = 0.01
 """Nearer things must show this much of themselves: 2 cm of pole over half a metre."""
 
+LINE_SHARE = 0.6
+"""Share of an element's breadth that a wire has to cover in it and in its neighbours (see `RangeHistogram`);
+half of what makes the others may be lost as single pixels."""
+
 LARGEST_SHARE = 0.05
 """But never more than this share of an element's pixels: something very near fills the view."""
 
@@ -149,6 +153,7 @@ class ObstacleScanner:
         self._view = BandView(camera, mount, max_distance_m, below_m, above_m)
         self._histogram = RangeHistogram(max_distance_m, self._joined_rays.shape[1])
         self._needed = self._needed_pixels(min_pixels)
+        self._line_needed = self._needed_of_line()
         self._known = np.empty((camera.height, camera.width), dtype=np.float32)
         self._neighbours = np.empty_like(self._known)
         self._bearings = sector_bearings_deg()
@@ -239,7 +244,7 @@ class ObstacleScanner:
             if obstacle.any():
                 doubt = None if shortening is None else shortening[chunk]
                 self._histogram.add(points[0], points[1], range_m, obstacle, doubt)
-        return self._histogram.nearest_m(self._needed)
+        return self._histogram.nearest_m(self._needed, self._line_needed)
 
     def _seen_free(
         self,
@@ -327,6 +332,17 @@ class ObstacleScanner:
         shown = pixels_at_1m * SMALLEST_AREA_M2 / np.square(self._histogram.edges_m[:-1].astype(np.float64))
         most = max(min_pixels, int(LARGEST_SHARE * element))
         return np.ceil(np.clip(shown, min_pixels, most) / self._together).astype(np.int64)
+
+    def _needed_of_line(self) -> NDArray[np.int64]:
+        """(72,) joined pixels of a level line one pixel thin in each element, times `LINE_SHARE`."""
+        camera = self.camera
+        aside = np.radians((sector_bearings_deg().astype(np.float64) - self.mount.yaw_deg + 180) % 360 - 180)
+        # Pixels lie the denser in angle the farther from the middle; 80 degrees off none has any.
+        stretch = 1 / np.square(np.maximum(np.cos(aside), 0.17))
+        on_its_side = abs(math.sin(math.radians(self.mount.roll_deg))) > 0.7
+        across = camera.fy / self._together if on_its_side else camera.fx
+        breadth = across * math.radians(SECTOR_WIDTH_DEG) * stretch
+        return np.maximum(np.ceil(LINE_SHARE * breadth), 4).astype(np.int64)
 
 
 def _nearest_of_rows(depth: NDArray[np.float32], together: int) -> NDArray[np.float32]:

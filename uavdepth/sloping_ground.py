@@ -147,7 +147,7 @@ class SlopingGround:
         start = np.fmin(np.fmin.accumulate(rise - climb, axis=1), 0.0)
         start = np.hstack([np.zeros((len(rise), 1)), start[:, :-1]])
         rise[rise > start + climb + noise] = np.nan
-        return rise
+        return np.minimum(rise, start + climb)
 
     def _believe(self, rise: NDArray[np.float64], height_m: float) -> None:
         """Take out, in place, surfaces that are too short, and first ones that come from above the foot."""

@@ -82,6 +82,24 @@ def pole(
     return meet
 
 
+def wire(first: Sequence[float], second: Sequence[float], thick_m: float) -> Solid:
+    """Round bar between two points (forward, right, down)."""
+    start = np.asarray(first, float)
+    length = float(np.linalg.norm(np.asarray(second, float) - start))
+    along = (np.asarray(second, float) - start) / length
+
+    def meet(origin: Array, rays: Array) -> Array:
+        off = origin - start
+        across, aside = rays - np.outer(rays @ along, along), off - (off @ along) * along
+        a, b, c = np.square(across).sum(axis=1), across @ aside, aside @ aside - (thick_m / 2) ** 2
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t = (-b - np.sqrt(b * b - a * c)) / a
+            place = off @ along + t * (rays @ along)
+            return np.where((t > 0) & (place > 0) & (place < length), t, np.inf)
+
+    return meet
+
+
 def turned(solid: Solid, by_deg: float) -> Solid:
     """The solid turned clockwise, seen from above, round the vehicle."""
     angle = np.radians(by_deg)
