@@ -127,8 +127,9 @@ class SlowLink:
                 self._pump(far_reader, writer, self._to_ground),
                 self._pump(reader, far_writer, self._to_vehicle),
             )
-        except (OSError, asyncio.IncompleteReadError):
-            pass
+        except (OSError, asyncio.CancelledError):
+            # A connection that ends, or the radio that is switched off.
+            return
         finally:
             writer.close()
             far_writer.close()

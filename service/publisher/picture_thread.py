@@ -29,7 +29,7 @@ _TAKE_S = 0.02
 """How soon a picture that was held back is looked at again."""
 
 _LOOK_PERIOD_NS = 500_000_000
-_RETRY_S = 0.1
+_RETRY_S = 2.0
 _SHARES = {keys.DEPTH: 0.6, keys.VIDEO: 0.6, keys.CAMERA: 0.4}
 _MAX_REPORTS = 64
 
