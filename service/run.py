@@ -223,7 +223,6 @@ class Service:
             camera=self._reader.status,
             link=link,
             publisher=None if publisher is None else publisher.status,
-            stream_profile=None if publisher is None else publisher.status.profile,
             memory_mib=resident_memory_mib(),
             altitude_m=altitude_m(pose),
             speed_mps=speed_mps(pose),
