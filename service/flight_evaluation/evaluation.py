@@ -9,7 +9,7 @@ from service.fake_autopilot.autopilot import Flavor
 from service.flight_evaluation.closed_loop import Flown, fly_route
 from service.flight_evaluation.configuration import settings_for
 from service.flight_evaluation.plan import EvaluationPlan
-from service.flight_evaluation.poses import trajectories
+from service.flight_evaluation.poses import trajectory
 from service.flight_evaluation.routes import Route, find_approaches, find_corridors, find_viewpoints
 from service.flight_evaluation.sight import DepthKind, Eyes
 from service.flight_evaluation.survey import Looked, Surveyor
@@ -32,6 +32,7 @@ class Evidence:
         poses, looked: the open part: random poses, and pictures of flights.
         bearing_errors_deg: in turns, of messages as they arrived.
         approaches, corridors: the closed loop.
+        flights: flown in the open part so far.
     """
 
     scene: str
@@ -41,6 +42,7 @@ class Evidence:
     bearing_errors_deg: list[float] = field(default_factory=list)
     approaches: list[Flown] = field(default_factory=list)
     corridors: list[Flown] = field(default_factory=list)
+    flights: int = 0
 
 
 @dataclass(frozen=True)
@@ -115,9 +117,12 @@ class Evaluation:
         if evidence.kind is DepthKind.TRUE:
             yield "random poses"
             evidence.poses += surveyor.poses(plan.seed, poses)
-        for trajectory in trajectories(scene, plan.seed + spec.seed, flights, plan.flight_s):
-            yield f"{trajectory.manoeuvre}"
-            evidence.looked += surveyor.flight(trajectory)
+        row = plan.seed + plan.scenes.index(spec.name)
+        for _ in range(flights):
+            flight = trajectory(scene, row, evidence.flights, plan.flight_s)
+            evidence.flights += 1
+            yield f"{flight.manoeuvre}"
+            evidence.looked += surveyor.flight(flight)
 
     def _turns(self, evidence: Evidence, scene: Scene, places: list[Route]) -> Iterator[str]:
         for number, place in enumerate(places):

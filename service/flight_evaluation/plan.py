@@ -33,7 +33,7 @@ class EvaluationPlan:
     latency_s: float = 0.1
     seed: int = 1
     poses: int = 100
-    flights: int = 6
+    flights: int = 5
     flight_s: float = 4.5
     approaches: int = 20
     corridors: int = 20
@@ -65,7 +65,7 @@ def quick(plan: EvaluationPlan) -> EvaluationPlan:
     return replace(
         plan,
         poses=10,
-        flights=2,
+        flights=3,
         flight_s=2.5,
         approaches=len(plan.scenes),
         corridors=len(plan.scenes),

@@ -35,6 +35,9 @@ class Manoeuvre(StrEnum):
     HOVER = "hover"
 
 
+_ROW = (Manoeuvre.CRUISE, Manoeuvre.TURN, Manoeuvre.HOVER, Manoeuvre.CRUISE, Manoeuvre.CRUISE)
+
+
 @dataclass(frozen=True)
 class Trajectory:
     """A flight to be looked at.
@@ -82,21 +85,23 @@ def random_pose(scene: Scene, rng: np.random.Generator) -> Pose:
     raise SceneError(f"no free place in {scene.name}:{scene.seed} after {_TRIES} tries")
 
 
-def trajectories(scene: Scene, seed: int, count: int, duration_s: float) -> list[Trajectory]:
-    """`count` flights in turns: cruises at the speeds of `SPEEDS_MPS`, turns, hovers."""
-    flights = []
-    for number in range(count):
-        rng = np.random.default_rng([seed, number, 0xF11E])
-        kind = (Manoeuvre.CRUISE, Manoeuvre.TURN, Manoeuvre.CRUISE, Manoeuvre.HOVER)[number % 4]
-        if kind is Manoeuvre.CRUISE:
-            speed_mps = SPEEDS_MPS[(number // 2 + seed) % len(SPEEDS_MPS)]
-            flights.append(cruise(scene, int(rng.integers(1 << 30)), speed_mps, duration_s))
-        elif kind is Manoeuvre.TURN:
-            rate_dps = TURN_RATES_DPS[(number // 4 + seed) % len(TURN_RATES_DPS)]
-            flights.append(turn(random_pose(scene, rng), rate_dps, duration_s))
-        else:
-            flights.append(hover(random_pose(scene, rng), rng, duration_s))
-    return flights
+def trajectory(scene: Scene, seed: int, number: int, duration_s: float) -> Trajectory:
+    """One of a row of flights: cruises at the speeds of `SPEEDS_MPS`, turns, hovers.
+
+    Args:
+        scene: where.
+        seed: of the row.
+        number: in the row.
+        duration_s: its length.
+    """
+    rng = np.random.default_rng([seed, number, 0xF11E])
+    kind = _ROW[number % len(_ROW)]
+    if kind is Manoeuvre.CRUISE:
+        speed_mps = SPEEDS_MPS[(2 * number + seed) % len(SPEEDS_MPS)]
+        return cruise(scene, int(rng.integers(1 << 30)), speed_mps, duration_s)
+    if kind is Manoeuvre.TURN:
+        return turn(random_pose(scene, rng), TURN_RATES_DPS[seed % len(TURN_RATES_DPS)], duration_s)
+    return hover(random_pose(scene, rng), rng, duration_s)
 
 
 def cruise(scene: Scene, seed: int, speed_mps: float, duration_s: float) -> Trajectory:

@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
-from uavdepth.level_ground import GROUND_DEPTH_SHARE, GROUND_FLOOR_M, GROUND_SLOPE
+from uavdepth.level_ground import GROUND_DEPTH_SHARE, GROUND_SLOPE
 from uavdepth.obstacle_scan import SECTOR_COUNT, SECTOR_WIDTH_DEG, sector_bearings_deg
+from uavdepth.sloping_ground import FLIGHT_CLEARANCE_M
 
 FARTHEST_M = 30.0
 """Truth reaches so far: a report of 19 m for a thing at 21 m is no false one."""
@@ -38,8 +39,13 @@ _PICTURE_MARGIN_PX = 2.0
 _GROUND_SKIN_M = 0.15
 """What lies nearer to the bare ground than this is called ground: meshes follow it that well."""
 
-GENTLE_SLOPE_DEG, STEEP_SLOPE_DEG = 15.0, 20.0
-"""Bare ground up to the first must not be reported; beyond the second it must."""
+GENTLE_SLOPE_DEG, STEEP_SLOPE_DEG = 12.0, 20.0
+"""Bare ground up to the first must not be reported, beyond the second it must: round the 15 degrees between
+them a slope of rough ground may be called either way."""
+
+_GROUND_SLOPE_DEG = 15.0
+_LOW_M = 0.6
+"""Things lower than this may be lost among the ground, as may what is lower than a share of the height."""
 
 _SLOPE_BASE_M = 0.5
 _NEIGHBOURS = [(down, right) for down in (-1, 0, 1) for right in (-1, 0, 1) if (down, right) != (0, 0)]
@@ -92,7 +98,8 @@ class TruthFinder:
     """Casts rays from the camera and sorts what they meet as the scanner's definition asks.
 
     A point is an obstacle when it lies in the height band and is not ground; ground is what rises less than
-    `GROUND_DEPTH_SHARE` of the height, at least 0.3 m, and slopes of up to 15 degrees. Rays stand for the
+    `GROUND_DEPTH_SHARE` of the height, at least 0.6 m, and slopes of up to 15 degrees as far as they stay
+    `FLIGHT_CLEARANCE_M` below the flight level. Rays stand for the
     solid angle between them, so that size is measured as the picture shows it.
 
     Args:
@@ -161,20 +168,21 @@ class TruthFinder:
         bare = np.abs(over) < _GROUND_SKIN_M
         slope = np.zeros(len(points))
         slope[bare] = _slope_deg(world, points[bare])
-        tolerance = max(GROUND_FLOOR_M, GROUND_DEPTH_SHARE * height_m) + GROUND_SLOPE * range_m + 0.1
+        tolerance = max(_LOW_M, GROUND_DEPTH_SHARE * height_m + 0.1) + GROUND_SLOPE * range_m
         # Whoever calls gentle slopes ground cannot tell where a steep one begins before it rises above them.
-        gentle_rise_m = math.tan(math.radians(GENTLE_SLOPE_DEG)) * range_m
+        gentle_rise_m = math.tan(math.radians(_GROUND_SLOPE_DEG)) * range_m
         steep = bare & (slope > STEEP_SLOPE_DEG) & (height_m - down > tolerance + gentle_rise_m)
         thing = over > tolerance
+        in_the_way = bare & (down < FLIGHT_CLEARANCE_M - 2.0 * margin)
         certain = (
-            (thing | steep)
+            (thing | steep | in_the_way)
             & (down < height_m - tolerance)
             & (down > -band.above_m + margin)
             & (down < band.below_m - margin)
             & (range_m < self._max_distance_m)
             & self._inside_picture(points - position, attitude)
         )
-        possible = ~(bare & (slope <= GENTLE_SLOPE_DEG))
+        possible = ~(bare & (slope <= GENTLE_SLOPE_DEG) & (down > FLIGHT_CLEARANCE_M + margin))
         return _Sorted(np.flatnonzero(near), range_m, _wrapped(bearing), possible, certain)
 
     def _inside_picture(self, offset_ned: NDArray[np.float64], attitude: Attitude) -> NDArray[np.bool_]:

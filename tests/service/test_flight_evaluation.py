@@ -18,7 +18,7 @@ from service.flight_evaluation.evaluation import Evaluation
 from service.flight_evaluation.judgement import Tally
 from service.flight_evaluation.plan import EvaluationPlan, quick
 from service.flight_evaluation.plots import draw, plots_are_possible
-from service.flight_evaluation.poses import Manoeuvre, hover, random_pose, turn
+from service.flight_evaluation.poses import Manoeuvre, hover, random_pose, trajectory, turn
 from service.flight_evaluation.report import report
 from service.flight_evaluation.sight import DepthKind
 from service.flight_evaluation.survey import Looked
@@ -151,6 +151,11 @@ class TestPoses:
             pose = random_pose(scene, rng)
             assert scene.clearance_m(pose.position_ned_m.tolist()) >= 1.0
             assert 1.5 <= -pose.position_ned_m[2] <= 8.0
+
+    def test_a_row_of_flights_holds_every_manoeuvre(self) -> None:
+        scene = world_with((10.0, 5.0, 4.0, 4.0, 6.0))
+        flights = [trajectory(scene, 1, number, 2.0) for number in range(EvaluationPlan().flights)]
+        assert {flight.manoeuvre for flight in flights} == set(Manoeuvre)
 
     def test_a_turn_reaches_its_rate(self) -> None:
         start = random_pose(world_with(), np.random.default_rng(1))
