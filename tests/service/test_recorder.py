@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -371,6 +373,34 @@ def test_packets_are_cut_out_of_any_stream() -> None:
     cut = [packet for i in range(0, len(stream), 7) for packet in cutter.cut(stream[i : i + 7])]
     assert cut.count(HEARTBEAT) >= 3
     assert all(packet == HEARTBEAT for packet in cut)
+
+
+def rerun_program() -> str | None:
+    """Rerun's own command line, where it is installed."""
+    found = importlib.util.find_spec("rerun_cli")
+    beside = Path(found.origin).with_name("rerun") if found is not None and found.origin else None
+    return str(beside) if beside is not None and beside.exists() else shutil.which("rerun")
+
+
+def test_reruns_own_converter_reads_pictures_depth_and_points(tmp_path: Path) -> None:
+    program = rerun_program()
+    if program is None:
+        pytest.skip("Rerun is not installed (pip install rerun-sdk)")
+    record, converted = record_of(tmp_path), tmp_path / "record.rrd"
+    told = [
+        subprocess.run(
+            [program, *words],
+            check=True,
+            capture_output=True,
+            text=True,
+            stdin=subprocess.DEVNULL,
+            timeout=60,
+        ).stdout
+        for words in (["mcap", "convert", record, "-o", converted], ["rrd", "print", converted])
+    ]
+    # Image:buffer is the depth in millimetres.
+    for component in ("EncodedImage", "Image:buffer", "Pinhole", "Points3D", "Transform3D"):
+        assert component in told[1]
 
 
 def test_a_recording_service_says_so(tmp_path: Path) -> None:
