@@ -144,8 +144,8 @@ def measure_stream(
     endpoint = free_zenoh_endpoint()
     settings = ZenohSettings(listen=(endpoint,), **overrides)
     with ExitStack() as stack:
-        vehicle = stack.enter_context(StreamVehicle(VEHICLE, settings))
         radio = stack.enter_context(SlowLink(int(endpoint.rpartition(":")[2]), link))
+        vehicle = stack.enter_context(StreamVehicle(VEHICLE, settings))
         station, near = _Station(MonotonicClock()), f"tcp/127.0.0.1:{radio.port}"
         scans = stack.enter_context(open_session((), (near,), None, Role.STATION))
         scans.declare_subscriber(keys.key(VEHICLE, keys.SCAN), station.take)
