@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 from typing import Annotated
 
@@ -68,5 +69,7 @@ def ground(
         if give_up_s is not None:
             station.await_peer(give_up_s)
         typer.echo(station.words)
-        with suppress(KeyboardInterrupt):  # uvicorn raises it again when everything is closed
+        # uvicorn raises the signal again that ended it: here the Zenoh sessions are still to be closed.
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        with suppress(KeyboardInterrupt):
             station.serve()

@@ -26,6 +26,9 @@ _MAX_NAME = 64
 _MAX_RATE_HZ = 120
 """Samples of one vehicle and topic that are read a second; what comes beyond is counted and left out."""
 
+_MIN_DEPTH_M, _MAX_DEPTH_M = 1e-3, 1e5
+"""They travel to the page as 32-bit floats."""
+
 _SECOND_NS = 1_000_000_000
 
 
@@ -248,8 +251,11 @@ class Fleet:
             check_jpeg(payload)
         else:
             header = DepthHeader.decode(attachment or b"")
-            if header.far_m <= header.near_m:
-                raise WireError(f"DepthHeader: far_m {header.far_m:g} is not beyond near_m {header.near_m:g}")
+            if not _MIN_DEPTH_M <= header.near_m < header.far_m <= _MAX_DEPTH_M:
+                raise WireError(
+                    f"DepthHeader: a span of {header.near_m:g} to {header.far_m:g} m: "
+                    f"{_MIN_DEPTH_M:g} to {_MAX_DEPTH_M:g} m can be shown"
+                )
             check_grey_png(payload)
         vehicle.picture_count[topic] += 1
         age_ns = vehicle.clock.age_ns(header.captured_ns, header.age_ms, now_ns)

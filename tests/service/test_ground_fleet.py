@@ -95,6 +95,13 @@ def test_pictures_are_handed_on_as_they_came() -> None:
         ("camera", depth_png(3.0), camera_header().encode(), "no JPEG"),
         ("depth", jpeg(1), depth_header().encode(), "no PNG"),
         ("depth", depth_png(3.0), b"{" * 5000, "DepthHeader"),
+        (
+            "depth",
+            depth_png(3.0),
+            depth_header().model_copy(update={"far_m": 1e300}).encode(),
+            "can be shown",
+        ),
+        ("depth", depth_png(3.0), depth_header().model_copy(update={"far_m": 0.1}).encode(), "can be shown"),
         ("camera", b"\xff\xd8" + bytes(MAX_PICTURE_BYTES), camera_header().encode(), "at most"),
         ("wind", b"1", None, "not shown"),
     ],

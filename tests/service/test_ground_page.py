@@ -7,7 +7,18 @@ from collections.abc import Iterator
 
 import pytest
 from chromium import Chromium, Tab, chromium, needs_chromium
-from ground_support import RunningStation, Talk, Vehicle, station
+from ground_support import (
+    RunningStation,
+    Talk,
+    Vehicle,
+    camera_header,
+    depth_header,
+    depth_png,
+    jpeg,
+    station,
+)
+
+from service.publisher import keys
 
 pytestmark = needs_chromium
 
@@ -67,6 +78,30 @@ def test_pictures_change_and_lighter_is_nearer(running: RunningStation, tab: Tab
         red, _, blue, _ = tab.evaluate(pixel("depth", 0.2, 0.2))
         assert abs(red - blue) < 20
     kite.die()
+
+
+def test_a_picture_that_cannot_be_decoded_is_left_out(running: RunningStation, tab: Tab) -> None:
+    rook = Vehicle(running.vehicles, "rook")
+
+    def speak() -> None:
+        rook.say(4.0, shade=77)
+        for topic, picture, header in (
+            (keys.CAMERA, jpeg(200), camera_header().encode()),
+            (keys.DEPTH, depth_png(1.0), depth_header().encode()),
+        ):
+            running.vehicles.put(
+                keys.key("rook", topic),
+                picture[:-30] + b"\xff" * 9 if topic == keys.DEPTH else picture[:170],
+                attachment=header,
+            )
+
+    with Talk(speak):
+        tab.open(f"{running.url}/#vehicle=rook")
+        tab.wait_for(f"{COUNT.format('camera')} > 2 && {COUNT.format('depth')} > 2")
+        tab.wait_for(is_text("#nearest", "4.0 m"))
+        assert tab.evaluate(pixel("camera", 0.5, 0.5))[0] < 120
+    rook.die()
+    tab.errors.clear()  # the page tells its console of pictures that are none
 
 
 def test_obstacle_clear_and_unknown_are_told_apart(running: RunningStation, tab: Tab) -> None:

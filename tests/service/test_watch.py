@@ -109,6 +109,31 @@ def test_the_nearest_obstacle_and_the_status_are_shown() -> None:
         assert words in text
 
 
+def test_what_the_vehicle_advises_and_records_is_shown() -> None:
+    board = Board()
+    status = status_bytes(
+        altitude_m=12.3,
+        speed_mps=4.5,
+        cp_delay_s=0.42,
+        margin_m=2.6,
+        recording=False,
+        recording_detail="disk full",
+        scale_sources=["ground", "points"],
+    )
+    board.hear("uavdepth/kite/status", status, 0)
+    text = text_of(board, 0)
+    for words in (
+        "12.3 m",
+        "4.5 m/s",
+        "0.42 s",
+        "margin 2.6 m",
+        "NOT RECORDING",
+        "disk full",
+        "ground, points",
+    ):
+        assert words in text
+
+
 def test_nothing_near_and_not_trusted_read_differently() -> None:
     board = Board()
     board.hear("uavdepth/kite/scan", scan_bytes(None), 0)
