@@ -37,6 +37,9 @@ _GROUND_DOUBT = 0.07
 """Relative error of metres from the ground that no single picture shows: 2 % of slope, half a degree of
 attitude, the rangefinder over grass."""
 
+_FRESH_SHARE = 0.4
+"""Of the points' error by regions, what is another one in the next picture."""
+
 _GROUND_COLUMNS = 32
 _GROUND_SIGMA = 0.1
 _RECENT_S = 0.3
@@ -117,6 +120,7 @@ class ScaleEstimator:
         self._disagreement.clear()
         self._shape: AffineShape | None = None
         self._scatter = 0.0
+        self._region_sigma = 0.0
         self._at_ns: int | None = None
 
     def update(
@@ -165,10 +169,16 @@ class ScaleEstimator:
             by_points = self._plausible_points(scale_from_points(sample(depth.depth_m, points, self.camera)))
         if by_points is not None:
             readings.append(
-                ScaleReading(POINTS, by_points.log_factor, by_points.shared_sigma, by_points.own_sigma)
+                ScaleReading(
+                    POINTS,
+                    by_points.log_factor,
+                    by_points.shared_sigma,
+                    _FRESH_SHARE * by_points.region_sigma,
+                )
             )
             share = 1.0 - math.exp(-passed_s) if self._scatter else 1.0
             self._scatter += share * (by_points.scatter - self._scatter)
+            self._region_sigma += share * (by_points.region_sigma - self._region_sigma)
         by_ground = None
         if ground is not None:
             by_ground = self._scaler.estimate(depth.depth_m, ground.attitude, ground.height_m)
@@ -230,16 +240,18 @@ class ScaleEstimator:
         if not held.known or held.age_s() > self.hold_s:
             return None
         sources = tuple(source for source in (GROUND, POINTS) if held.age_s(source) <= _RECENT_S)
+        # Errors of regions come in every reading anew, but not by chance: they do not average out.
+        sigma = math.hypot(held.sigma, self._region_sigma)
         scale, shift, covariance = math.exp(-held.log_factor), 0.0, (0.0, 0.0, 0.0)
         if self._shape is not None:
             theta = scale * np.array([self._shape.scale, self._shape.shift])
-            whole = scale**2 * self._shape.relative() + held.sigma**2 * np.outer(theta, theta)
+            whole = scale**2 * self._shape.relative() + sigma**2 * np.outer(theta, theta)
             covariance = float(whole[0, 0]), float(whole[0, 1]), float(whole[1, 1])
             scale, shift = float(theta[0]), float(theta[1])
         return ScaleEstimate(
             scale,
             shift,
-            held.sigma,
+            sigma,
             sources,
             held.age_s(),
             self._disagreement.text,

@@ -28,6 +28,9 @@ _UNKNOWN = 4.0
 
 _FRESH_S = 2.0
 _WANDER_MEMORY_S = 0.7
+_READING_NOISE = 0.01
+"""Of the points' readings from picture to picture, where neither motion nor network changes."""
+
 _LARGEST_WANDER = 0.5
 
 
@@ -187,7 +190,7 @@ class ScaleFilter:
         reading = next((each for each in readings if each.source == POINTS), None)
         if reading is not None and self._last_points is not None and 0 < passed_s < _WANDER_MEMORY_S:
             step = reading.log_factor - self._last_points
-            found = max(step**2 - 2 * reading.own_sigma**2, 0.0) / passed_s
+            found = max(step**2 - 2 * _READING_NOISE**2, 0.0) / passed_s
             share = 1.0 - math.exp(-passed_s / _WANDER_MEMORY_S)
             self._wander_variance += share * (min(found, _LARGEST_WANDER**2) - self._wander_variance)
             self._wander_variance = max(self._wander_variance, self._wander**2)

@@ -20,6 +20,9 @@ _TILES = 6
 """The picture is cut into 6 x 6 tiles: a network errs alike on neighbouring points."""
 
 _LEAST_TILES = 3
+_CROWD = 4.0
+"""More points in one tile are worth no more than so many."""
+
 
 _NETWORK_SCATTER = 0.1
 """Relative error of a good network from point to point, added to the points' own in their weights."""
@@ -44,8 +47,9 @@ class PointScale:
     Args:
         log_factor: log of metres for each unit of the network's depth.
         shared_sigma: one standard deviation of it that more points of the same picture, or of the next
-            pictures, do not make smaller: velocity errors, and a network that is off in whole regions.
-        own_sigma: the rest, another one in each picture.
+            pictures, do not make smaller: errors of the velocity.
+        region_sigma: the same of a network that is off in whole regions of the picture; it changes with
+            what is seen.
         scatter: of the points about the factor: how far the network's depth is off from place to place,
             relative, the points' own errors taken out.
         points: that agreed.
@@ -53,7 +57,7 @@ class PointScale:
 
     log_factor: float
     shared_sigma: float
-    own_sigma: float
+    region_sigma: float
     scatter: float
     points: int
 
@@ -129,6 +133,8 @@ def scale_from_points(sampled: SampledPoints) -> PointScale | None:
     ratio = np.log(sampled.depth_m[known] / sampled.network[known])
     sigma, tile = sampled.sigma[known], sampled.tile[known]
     weight = 1.0 / (sigma**2 + _NETWORK_SCATTER**2)
+    # A crowd of points in one place says what that place says, not what the picture does.
+    weight *= np.minimum(1.0, _CROWD / np.bincount(tile)[tile])
     centre = weighted_median(ratio, weight)
     robust = weight
     for _ in range(_ITERATIONS):
@@ -151,9 +157,9 @@ def scale_from_points(sampled: SampledPoints) -> PointScale | None:
     own = float(robust @ sigma / robust.sum())
     return PointScale(
         centre,
+        shared,
         # Where no points lie the network is off by as much as it is anywhere.
-        math.hypot(shared, max(scatter, _NETWORK_SCATTER) / math.sqrt(worth)),
-        scatter / math.sqrt(count),
+        max(scatter, _NETWORK_SCATTER) / math.sqrt(worth),
         math.sqrt(max(scatter**2 - own**2, 0.0)),
         count,
     )
