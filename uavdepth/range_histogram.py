@@ -161,7 +161,8 @@ class RangeHistogram:
 
     def _summed_doubt(self, size: int, rows: NDArray[np.intp]) -> NDArray[np.float64]:
         """(rows, bins + 1) shortening of all points below each bin."""
-        total = np.bincount(self._cells[: self._used], self._doubt[: self._used], size)[1:size]
+        wanted = np.flatnonzero(self._cells[: self._used])
+        total = np.bincount(self._cells[wanted], self._doubt[wanted], size)[1:size]
         total = total.reshape(SECTOR_COUNT + 1, self._bins)
         total[0] += total[-1]
         below = np.zeros((rows.size, self._bins + 1))

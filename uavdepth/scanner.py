@@ -213,9 +213,9 @@ class ObstacleScanner:
         """(joined pixels,) share of an obstacle's distance to take off, 0 to `LARGEST_SHORTENING`."""
         if shortening is None:
             return None
-        joined = -_nearest_of_rows(-shortening, self._together)  # the most doubtful row stands for its group
-        joined[np.isnan(joined)] = LARGEST_SHORTENING
-        return np.clip(joined, 0.0, LARGEST_SHORTENING, out=joined).ravel()
+        joined = shortening[:: self._together].copy()  # doubt is smooth: one row stands for its group
+        joined[~(joined <= LARGEST_SHORTENING)] = LARGEST_SHORTENING  # NaN too
+        return np.maximum(joined, 0.0, out=joined).ravel()
 
     def _without_speckles(self, depth: NDArray[np.float32]) -> NDArray[np.float32]:
         """Depth with unknown as +inf, and single pixels pushed back to the nearest of their neighbours.
