@@ -11,7 +11,7 @@ from typing import BinaryIO
 
 import lz4.frame
 import zstandard
-from mcap.exceptions import EndOfFile, McapError
+from mcap.exceptions import EndOfFile, McapError, RecordLengthLimitExceeded
 from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 
@@ -160,8 +160,9 @@ def _opened(path: Path) -> BinaryIO:
 
 
 def _words(error: BaseException) -> str:
-    return (
-        str(error)
-        if isinstance(error, McapError) and str(error)
-        else f"it is damaged ({type(error).__name__})"
-    )
+    if isinstance(error, RecordLengthLimitExceeded):
+        # The length of a chunk is filled in when it is finished; until then every bit of it is set.
+        unfinished = str(2**64 - 1) in str(error)
+        return "it is cut off inside a chunk" if unfinished else str(error)
+    named = isinstance(error, McapError) and str(error)
+    return str(error) if named else f"it is damaged ({type(error).__name__})"

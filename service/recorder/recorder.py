@@ -299,7 +299,10 @@ class Recorder:
             log.warning("recording has stopped", problem=reason, tried_again_every_s=_RETRY_NS / 1e9)
         self._problem = reason
         self._retry_due_ns = self._clock.now_ns() + _RETRY_NS
+        was_open = self._writer is not None
         self._close()
+        if was_open and self._take is not None:
+            self._shelf.drop_empty(self._take, self._part)
 
     def _close(self) -> None:
         writer, self._writer = self._writer, None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -83,6 +84,14 @@ class Shelf:
                 f"[record] folder {self._folder}: {free / _MIB:.0f} MiB left on the disk, "
                 f"min_free_mib is {self._min_free_bytes // _MIB}"
             )
+
+    def drop_empty(self, take: Take, part: int) -> None:
+        """Delete the files of a part into which nothing could be written; never raises."""
+        for suffix in (".mcap", ".tlog"):
+            path = take.part(part, suffix)
+            with suppress(OSError):
+                if path.stat().st_size == 0:
+                    path.unlink()
 
     def _keep_cap(self, take: Take, part: int) -> None:
         current = {take.part(part, suffix).name for suffix in (".mcap", ".tlog")}
