@@ -32,7 +32,7 @@ def evaluate_flight(
     scenes: Annotated[
         str | None, typer.Option(help="Scenes by name, separated by commas; all five if left out.")
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="A minute's worth: to see that it works.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="A minute or two: to see that it works.")] = False,
     approaches: Annotated[
         int | None,
         typer.Option(min=0, help="Approaches of all scenes together, each flown by both autopilots."),

@@ -61,17 +61,8 @@ class EvaluationPlan:
 
 
 def quick(plan: EvaluationPlan) -> EvaluationPlan:
-    """The same in about a minute: enough to see that everything works, not enough to judge by."""
-    return replace(
-        plan,
-        poses=10,
-        flights=3,
-        flight_s=2.5,
-        approaches=len(plan.scenes),
-        corridors=len(plan.scenes),
-        turns=1,
-        worlds=1,
-    )
+    """The same in a minute or two: enough to see that everything works, not enough to judge by."""
+    return replace(plan, poses=6, flights=1, flight_s=2.5, approaches=2, corridors=2, turns=1, worlds=1)
 
 
 def _spread(total: int, parts: int) -> tuple[int, ...]:

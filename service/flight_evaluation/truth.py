@@ -48,7 +48,6 @@ _LOW_M = 0.6
 """Things lower than this may be lost among the ground, as may what is lower than a share of the height."""
 
 _SLOPE_BASE_M = 0.5
-_NEIGHBOURS = [(down, right) for down in (-1, 0, 1) for right in (-1, 0, 1) if (down, right) != (0, 0)]
 
 
 class RayWorld(Protocol):
@@ -251,23 +250,23 @@ class TruthFinder:
 
 
 def _coherent(rays: NDArray[np.intp], range_m: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which rays are no lonely ones: at least two of the eight beside them meet something as far.
+    """Which rays lie in a square of four that meet the same thing.
 
-    A scanner drops lonely pixels as noise, and so it may drop the far mesh of a fence; a line stays.
+    What is thinner than two rays may fall between the picture's pixels, which are nearly as far apart.
 
     Args:
         rays: (n,) numbers in the fan.
         range_m: (n,) what each has met; NaN for what does not count.
     """
     rows, columns = _fan_shape()
-    grid = np.full((rows + 2, columns + 2), np.nan)
-    row, column = rays // columns + 1, rays % columns + 1
-    grid[row, column] = range_m
-    beside = np.zeros(len(rays), np.intp)
-    for down, right in _NEIGHBOURS:
-        with np.errstate(invalid="ignore"):
-            beside += np.abs(grid[row + down, column + right] - range_m) < (_DEPTH_WINDOW - 1.0) * range_m
-    return beside >= 2
+    grid = np.full((rows, columns), np.nan)
+    grid.ravel()[rays] = range_m
+    squares = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[:-1, 1:], grid[1:, 1:]])
+    whole = squares.max(axis=0) < _DEPTH_WINDOW * squares.min(axis=0)
+    member = np.zeros((rows, columns), np.bool_)
+    for down, right in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        member[down : rows - 1 + down, right : columns - 1 + right] |= whole
+    return np.asarray(member.ravel()[rays] & ~np.isnan(range_m))
 
 
 def _nearest_any(found: _Sorted) -> NDArray[np.float64]:
