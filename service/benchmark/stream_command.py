@@ -20,7 +20,7 @@ def benchmark_stream(
     seconds: Annotated[float, typer.Option(min=1.0, help="How long it is measured.")] = 30.0,
     settling_s: Annotated[float, typer.Option("--settling", min=0.0, help="Seconds before that.")] = 5.0,
     profile: Annotated[str, typer.Option(help="full, thin or scan-only.")] = "full",
-    limit: Annotated[float, typer.Option(min=32.0, help="[zenoh] max_kbit_per_s of the vehicle.")] = 8000.0,
+    limit: Annotated[float, typer.Option(min=32.0, help="\\[zenoh] max_kbit_per_s of the vehicle.")] = 8000.0,
     depth_rate_hz: Annotated[float, typer.Option(min=0.1, max=60.0, help="Depth pictures offered.")] = 15.0,
     camera_rate_hz: Annotated[float, typer.Option(min=0.1, max=60.0, help="Camera pictures offered.")] = 15.0,
     one_session: Annotated[

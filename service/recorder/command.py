@@ -12,7 +12,7 @@ from service.options import AutopilotOption, ConfigOption, OverridesOption
 
 def record(
     folder: Annotated[
-        Path | None, typer.Argument(help="Where the record goes; [record] folder otherwise.")
+        Path | None, typer.Argument(help="Where the record goes; \\[record] folder otherwise.")
     ] = None,
     config: ConfigOption = None,
     camera: Annotated[

@@ -51,7 +51,7 @@ def replay(
         str | None, typer.Option(help="Send the scans to this live autopilot, e.g. tcp:127.0.0.1:5760.")
     ] = None,
     zenoh: Annotated[
-        bool, typer.Option("--zenoh", help="Publish for ground stations, as [zenoh] says.")
+        bool, typer.Option("--zenoh", help="Publish for ground stations, as \\[zenoh] says.")
     ] = False,
     fps: Annotated[
         float | None, typer.Option(min=0.1, max=240, help="Pictures a second, for videos that do not tell.")

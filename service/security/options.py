@@ -14,7 +14,7 @@ SecurityConfigOption = Annotated[
     typer.Option(
         "--config",
         "-c",
-        help="TOML file whose [zenoh] section says where to connect and with which certificates; "
+        help="TOML file whose \\[zenoh] section says where to connect and with which certificates; "
         "`uavdepth keys new` writes one for each viewer and router.",
     ),
 ]
