@@ -59,8 +59,9 @@ def comparison_picture(
         large = np.repeat(np.repeat(panel[:, order], _CELL, axis=1), _CELL // 2, axis=0)
         drawn = cv2.copyMakeBorder(large, _TOP, 4, 0, _GAP, cv2.BORDER_CONSTANT, value=(0, 0, 0))
         cv2.putText(drawn, words, (4, 16), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (255, 255, 255), 1, cv2.LINE_AA)
-        axis = "-180            nose             +180 deg"
-        cv2.putText(drawn, axis, (4, 36), cv2.FONT_HERSHEY_SIMPLEX, 0.4, (200, 200, 200), 1, cv2.LINE_AA)
+        width = SECTOR_COUNT * _CELL
+        for label, x in (("-180", 4), ("nose", width // 2 - 16), ("+180 deg", width - 64)):
+            cv2.putText(drawn, label, (x, 36), cv2.FONT_HERSHEY_SIMPLEX, 0.4, (200, 200, 200), 1, cv2.LINE_AA)
         panels.append(drawn)
     return np.asarray(np.hstack(panels), np.uint8)
 
