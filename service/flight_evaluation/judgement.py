@@ -90,7 +90,9 @@ def judge(truth: TrueElements, scan: ObstacleScan) -> Tally:
         false=_count(false),
         blank=_count(truth.looked_at & unknown),
         relative_errors=np.abs(distance[found] - certain[found]) / certain[found],
-        nearest_errors=_nearest_error(certain[measured], distance[truth.looked_at]),
+        nearest_errors=_nearest_error(
+            certain[measured], distance[truth.looked_at], truth.any_m[truth.looked_at]
+        ),
     )
 
 
@@ -108,13 +110,16 @@ def together(tallies: Iterable[Tally]) -> Tally:
     )
 
 
-def _nearest_error(true_m: NDArray[np.float64], told_m: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(0,) or (1,): of the nearest obstacle."""
-    if not true_m.size:
+def _nearest_error(
+    true_m: NDArray[np.float64], told_m: NDArray[np.float64], any_m: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(0,) or (1,): of the nearest obstacle; a nearer thing that need not be told, such as a wire, may be."""
+    if not true_m.size or not told_m.size:
         return np.empty(0)
-    true = float(true_m.min())
-    told = float(told_m.min()) if told_m.size else np.inf
-    return np.array([abs(told - true) / true])
+    nearest = int(told_m.argmin())
+    told, true = float(told_m[nearest]), float(true_m.min())
+    candidates = [true] if told >= true else [true, float(any_m[nearest])]
+    return np.array([min(abs(told - candidate) / candidate for candidate in candidates)])
 
 
 def _count(chosen: NDArray[np.bool_]) -> int:
