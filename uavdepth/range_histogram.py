@@ -132,7 +132,8 @@ class RangeHistogram:
         if line_needed is not None:
             of_row = line_needed[(rows - _ROWS_TO_FIRST_BEARING) % SECTOR_COUNT]
             line = self._lines(support >= of_row[:, None], rows)
-            nearer = line < starts
+            # The front of a wall is a line too: only what ends before the next thing begins is a line alone.
+            nearer = np.append(self._window_end, self._bins + 1)[line] <= starts
             starts, least = np.where(nearer, line, starts), np.where(nearer, of_row // 2, least)
         for row in np.flatnonzero(starts < self._bins):
             start = starts[row]
