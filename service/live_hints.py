@@ -41,6 +41,11 @@ class LiveHints:
         self._epoch: int | None = None
         self._complained = False
 
+    @property
+    def suspicion(self) -> str | None:
+        """What turns in flight show to be wrong with the focal length, in words, or None."""
+        return None if self._points is None else self._points.suspicion
+
     def clear(self) -> None:
         """Forget all points and the motion."""
         self._motion.clear()

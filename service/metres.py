@@ -117,7 +117,7 @@ class Metres:
         age_s = ground.height.age_s if isinstance(ground, KnownGround) and "points" not in sources else 0.0
         if len(sources) > 1:
             self._compare(raw, ground, points, frame.captured_ns)
-        scale = ScaleStatus(1.0, min(by_ground, by_points), age_s, sources, self._suspicion)
+        scale = ScaleStatus(1.0, min(by_ground, by_points), age_s, sources, self._suspected(self._suspicion))
         trouble = self._gate(scale, ground)
         if trouble is not None:
             return replace(measured, scale=scale, trouble=trouble)
@@ -164,7 +164,8 @@ class Metres:
         if isinstance(ground, KnownGround) and "points" not in estimate.sources:
             sigma = math.hypot(sigma, ground.height.relative_sigma)
         age_s = self._age_s(estimate, ground, frame.captured_ns)
-        scale = ScaleStatus(estimate.factor, sigma, age_s, tuple(estimate.sources), estimate.suspicion)
+        suspicion = self._suspected(estimate.suspicion)
+        scale = ScaleStatus(estimate.factor, sigma, age_s, tuple(estimate.sources), suspicion)
         trouble = self._gate(scale, ground)
         if trouble is not None:
             return replace(measured, scale=scale, trouble=trouble)
@@ -196,6 +197,11 @@ class Metres:
         return DepthMap(depth_m, metres.relative_sigma)
 
     # -- both
+
+    def _suspected(self, by_metres: str | None) -> str | None:
+        """What seems to be configured wrong; turns name the cause where metres only contradict each other."""
+        by_turns = None if self._points is None else self._points.suspicion
+        return by_turns or by_metres
 
     def _measured_points(self, frame: Frame, telemetry_at: TelemetryAt) -> PointHints | None:
         return None if self._points is None else self._points.update(frame, telemetry_at)

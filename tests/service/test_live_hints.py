@@ -21,6 +21,7 @@ from service.trouble import Trouble
 from uavdepth.camera import CameraModel
 from uavdepth.depth_map import DepthMap
 from uavdepth.hints import Hints, PointHints
+from uavdepth.motion_points import MotionPoints
 from uavdepth.scale_estimator import ScaleEstimator
 from uavdepth.scanner import ObstacleScanner
 
@@ -173,6 +174,22 @@ def test_a_height_that_contradicts_the_motion_for_seconds_is_suspected(
     assert result.scale is not None
     assert (result.scale.suspicion is not None) is is_suspected
     assert (perception.remark(result) == SUSPICION_TEXT) is is_suspected
+
+
+@pytest.mark.parametrize("hinted", [True, False])
+def test_turns_that_contradict_the_focal_length_are_told_to_the_pilot(
+    hinted: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        MotionPoints, "suspicion", property(lambda _points: "the focal length is 20 % too long")
+    )
+    scale = None if hinted else ScaleEstimator(CAMERA, MOUNT, "relative")
+    perception = Perception(SETTINGS, TakesPoints(), scale, ObstacleScanner(CAMERA, MOUNT))
+    for seconds in every(0.1, 1.0):
+        result = perception.step_late(frame_at(seconds), flying)
+    assert result.scale is not None
+    assert result.scale.suspicion == "the focal length is 20 % too long"
+    assert perception.remark(result) == SUSPICION_TEXT
 
 
 def test_a_network_that_takes_the_ground_alone_costs_no_points() -> None:
