@@ -28,6 +28,9 @@ _NEAREST_WAYS = 4.0
 """Clear speaks of what lies further off than four times the way moved, seen from where the vehicle is now:
 bearings have then changed by less than 15 degrees."""
 
+_FARTHEST_SHARE = 0.5
+"""But of all that lies beyond half of maximum distance, however long the way."""
+
 _RANGES = 9
 """Ranges at which a direction is followed back into the old scan, evenly in 1/range: 2 degrees apart."""
 
@@ -71,7 +74,8 @@ def moved_scan(scan: ObstacleScan, turned_rad: float, moved_level_m: tuple[float
 
     An obstacle is somewhere on its element's arc, so it is told in every element that the moved arc touches,
     at the nearest distance there. An element is clear where all of it was clear before: each element of the
-    old scan that it crosses, up to the obstacle there, beyond four times the way moved. The last bit before
+    old scan that it crosses, up to the obstacle there, beyond four times the way moved or half of maximum
+    distance, whichever is nearer. The last bit before
     maximum distance, as long as the way moved, is new and taken for what lies before it.
 
     Each move widens obstacles by up to an element: move the scan as it was taken, not one that was moved.
@@ -152,7 +156,8 @@ def _still_clear(scan: ObstacleScan, turned_deg: float, way: NDArray[np.float64]
         return perhaps
     edge = SECTOR_WIDTH_DEG / 2 - _OVERLAP_DEG
     across = bearings[perhaps] + np.linspace(-edge, edge, _PIECES)
-    nearest = min(max(_NEAREST_WAYS * float(np.hypot(*way)), scan.min_distance_m), 0.99 * scan.max_distance_m)
+    nearest = max(_NEAREST_WAYS * float(np.hypot(*way)), scan.min_distance_m)
+    nearest = min(nearest, _FARTHEST_SHARE * scan.max_distance_m)
     ranges = 1.0 / np.linspace(1.0 / scan.max_distance_m, 1.0 / nearest, _RANGES if way.any() else 1)
     points = way + ranges[:, None] * _unit(across)[:, :, None, :]
     element = _element_of(points)

@@ -123,6 +123,15 @@ def test_unknown_never_becomes_clear(state, distance, turn, forward, right) -> N
             assert state[crossed] == SectorState.CLEAR or in_front
 
 
+@pytest.mark.parametrize("way_m", [3.0, 4.5, 6.0])
+def test_unknown_in_the_middle_is_not_passed_over_however_far_the_vehicle_has_flown(way_m: float) -> None:
+    field = [element(bearing) for bearing in range(-60, 65, 5)]
+    after = moved_scan(scan_with({}, [k for k in field if k != element(25)]), 0.0, (0.0, way_m))
+    unseen = math.radians(25.0)
+    across, along = 15.0 * math.sin(unseen) - way_m, 15.0 * math.cos(unseen)
+    assert after.state[element(math.degrees(math.atan2(across, along)))] == SectorState.UNKNOWN
+
+
 @given(states, metres, st.floats(-math.pi, math.pi), ways, ways)
 def test_no_obstacle_is_lost(state, distance, turn, forward, right) -> None:
     distance = np.where(state == SectorState.OBSTACLE, distance, np.float32(np.nan))
