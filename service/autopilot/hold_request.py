@@ -123,6 +123,11 @@ class HoldRequest:
         self._tries += 1
         return command
 
+    def give_up(self) -> None:
+        """The line was silent: what was asked then must not reach a pilot who flies by hand by now."""
+        if self.outcome is HoldOutcome.ASKED:
+            self.outcome = HoldOutcome.UNANSWERED
+
     def on_ack(self, ack: mavlink.MAVLink_command_ack_message) -> None:
         """Take a COMMAND_ACK; those to other commands and to other senders are not looked at."""
         if self.outcome is not HoldOutcome.ASKED or ack.command != mavlink.MAV_CMD_DO_SET_MODE:

@@ -28,7 +28,9 @@ class Requests:
         """The last request to stop and stay; None if there was none."""
 
     def restart(self) -> None:
-        """Ask for everything again."""
+        """Ask for everything again, but not to stop: that was asked for another moment."""
+        if self.hold is not None:
+            self.hold.give_up()
         self._streams.restart()
         self._timesync.restart()
         self._choice.restart()

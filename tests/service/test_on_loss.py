@@ -260,6 +260,17 @@ class TestHowItIsAsked:
         assert len(talk.commands) == 1
         assert talk.outcome is HoldOutcome.OVERRULED
 
+    def test_what_a_broken_line_kept_back_is_not_asked_when_it_is_back(self) -> None:
+        talk = Talk()
+        talk.talk.session.ask_to_hold()
+        talk.talk.session.line_failed("cable out")
+        talk.talk.wait_s(20.0)
+        talk.talk.session.line_opened(talk.talk.now_ns)
+        talk.beat(5)
+        talk.talk.wait_s(2.0)
+        assert talk.commands == []
+        assert talk.outcome is HoldOutcome.UNANSWERED
+
     def test_nothing_is_asked_before_an_autopilot_is_heard(self) -> None:
         talk = Conversation(S)
         assert talk.session.ask_to_hold() == ""
