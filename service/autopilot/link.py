@@ -29,7 +29,7 @@ _JOIN_S = 3.0
 _MAX_PENDING_BYTES = 400
 """Two OBSTACLE_DISTANCE: while more waits for the line, nothing new is made."""
 
-_log = structlog.get_logger("autopilot")
+log = structlog.get_logger("autopilot")
 
 Tap = Callable[[bytes, int, bool, Hashable], None]
 """Gets bytes of the line, when they passed, whether they left, and whose they are. Must not wait or raise."""
@@ -159,7 +159,7 @@ class AutopilotLink:
     def _sign(self, path: Path) -> None:
         key = load_signing_key(path)
         if key.warning is not None:
-            _log.warning(key.warning)
+            log.warning(key.warning)
         with self._lock:
             self._session.sign_with(key)
 
@@ -194,14 +194,21 @@ class AutopilotLink:
                 self._turn(transport)
             self._turn(transport)  # the last words: a text or state that was set just before closing
         except OSError as error:
-            with self._lock:
-                self._session.line_failed(_reason(error))
-            self._tell()
-            self._first_transport = None
-            self._stop.wait(_RETRY_S)
+            self._lose(_reason(error))
+        except Exception as error:
+            # A fault of ours in one message must not take the obstacles away for the rest of the flight.
+            log.exception("the autopilot link broke and begins anew")
+            self._lose(f"{type(error).__name__}: {error}")
         finally:
             if transport is not None:
                 transport.close()
+
+    def _lose(self, reason: str) -> None:
+        with self._lock:
+            self._session.line_failed(reason)
+        self._tell()
+        self._first_transport = None
+        self._stop.wait(_RETRY_S)
 
     def _turn(self, transport: Transport) -> None:
         """Wait for bytes, for something to send or for the next tick, and handle it."""
@@ -234,9 +241,9 @@ class AutopilotLink:
             notices = self._session.take_notices()
         for notice in notices:
             if notice.problem:
-                _log.warning(notice.text)
+                log.warning(notice.text)
             else:
-                _log.info(notice.text)
+                log.info(notice.text)
 
 
 def _reason(error: OSError) -> str:

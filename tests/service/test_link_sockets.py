@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 import pty
 import socket
+import struct
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from structlog.testing import capture_logs
 from service.autopilot.link import AutopilotLink
 from service.autopilot.serial_transport import SerialTransport
 from service.autopilot.service_state import ServiceState
+from service.autopilot.session import LinkSession
 from service.autopilot.stalled_write import StalledWrite
 from service.clock import ManualClock, MonotonicClock
 from service.errors import LinkError
@@ -290,6 +292,27 @@ def test_garbage_from_the_network_does_no_harm() -> None:
             noise.sendto(os.urandom(size), ("127.0.0.1", link.listen_port))
         with udp_peer(link.listen_port):
             eventually(lambda: link.status().connected)
+
+
+def test_a_fault_of_the_service_itself_does_not_end_the_link(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole, faults = LinkSession.receive, [ZeroDivisionError("a fault"), struct.error("another")]
+
+    def faulty(session: LinkSession, data: bytes, arrival_ns: int, source: Hashable = None) -> None:
+        if faults:
+            raise faults.pop()
+        whole(session, data, arrival_ns, source)
+
+    monkeypatch.setattr(LinkSession, "receive", faulty)
+    with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as unused:
+        unused.bind(("127.0.0.1", 0))
+        port = unused.getsockname()[1]
+    with capture_logs() as logs, link_to(f"udp:127.0.0.1:{port}") as link, udp_peer(port):
+        eventually(lambda: link.status().connected)
+        eventually(lambda: link.send_obstacles(clear_scan(), time.monotonic_ns()))
+    assert not faults
+    assert [entry["event"] for entry in logs if entry["log_level"] == "error"] == [
+        "the autopilot link broke and begins anew"
+    ] * 2
 
 
 def test_a_peer_that_reads_nothing_does_not_hold_up_the_sender(server: socket.socket) -> None:
