@@ -40,6 +40,7 @@ class TelemetryTracker:
         self._boot = BootTime()
         self._motion = MotionHistory(limits)
         self._sensor: tuple[int, int] | None = None
+        self._forgotten = 0
 
     @property
     def reboots(self) -> int:
@@ -48,10 +49,11 @@ class TelemetryTracker:
 
     @property
     def _epoch(self) -> int:
-        return self.reboots + self.clock.steps
+        return self.reboots + self.clock.steps + self._forgotten
 
     def forget(self) -> None:
-        """Another autopilot speaks now."""
+        """Another autopilot speaks now, or the same one from elsewhere, after who knows how many reboots."""
+        self._forgotten += 1
         reboots, steps = self._boot.reboots, self.clock.steps
         self._boot, self.clock = BootTime(), ClockSync()
         self._boot.reboots, self.clock.steps = reboots, steps
