@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -20,6 +21,7 @@ from service.latest_slot import LatestSlot
 from service.perception_result import PerceptionResult
 from service.pipeline import Perception, pose_of
 from service.settings import ExtraCameraSettings, Settings
+from service.telemetry import Telemetry
 from uavdepth.obstacle_scan import ObstacleScan
 from uavdepth.scan_merge import merge_scans
 from uavdepth.scan_motion import moved_scan
@@ -30,6 +32,9 @@ _TAKE_S = 0.1
 _JOIN_TIMEOUT_S = 3.0
 _SETTLED_NS = 1_000_000_000
 """A side that is lost or back is told when it has been so for a second."""
+
+_LARGEST_JUMP_M = 0.5
+"""Positions that part further from the way that the velocity tells were reset in between."""
 
 
 class SideLink(PoseSource, Protocol):
@@ -131,7 +136,7 @@ class SideCameras:
         if seen is None or not seen.trusted or abs(main.captured_ns - seen.captured_ns) > self._max_age_ns:
             return None
         here, then = pose_of(main.telemetry), pose_of(seen.telemetry)
-        if here is None or then is None:
+        if here is None or then is None or _was_reset(seen.telemetry, main.telemetry):
             return None
         turned_rad, moved_m = then.motion_to(here)
         return moved_scan(seen.scan, turned_rad, moved_m)
@@ -147,7 +152,8 @@ class SideCameras:
             return
         side.is_used, side.since_ns = is_used, None
         state = "ON" if is_used else "OFF"
-        trouble = side.result.trouble if side.result is not None else None
+        result = side.result  # its thread may change it at any time
+        trouble = None if result is None else result.trouble
         log.info(f"side camera {state}", camera=side.name, trouble=trouble and trouble.value)
         self._link.say(
             SEVERITY_INFO if is_used else SEVERITY_WARNING, f"uavdepth: camera {side.name} {state}"
@@ -163,3 +169,17 @@ class SideCameras:
             except Exception:
                 side.result = None
                 log.exception("a side camera's perception broke", camera=side.name, frame=frame.index)
+
+
+def _was_reset(first: Telemetry, second: Telemetry) -> bool:
+    """Whether the autopilot's positions jumped between two moments, or are those of another start."""
+    if first.epoch != second.epoch:
+        return True
+    before, after = first.position_ned_m, second.position_ned_m
+    start_mps, end_mps = first.velocity_ned_mps, second.velocity_ned_mps
+    if before is None or after is None or start_mps is None or end_mps is None:
+        return False
+    half_s = 0.5e-9 * (second.at_ns - first.at_ns)
+    flown = [half_s * (start + end) for start, end in zip(start_mps, end_mps, strict=True)]
+    north_m, east_m = (after[axis] - before[axis] - flown[axis] for axis in (0, 1))
+    return not math.hypot(north_m, east_m) <= _LARGEST_JUMP_M

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -113,6 +114,27 @@ def test_a_side_is_turned_with_the_vehicle_to_the_moment_of_the_main_picture() -
     # The side's right edge, 40 degrees beyond its middle, moves from 130 to 100 degrees.
     assert span.max() <= straight.max() + 18 - 6 + 1
     assert turned.scan.state[RIGHT - 6] == SectorState.OBSTACLE
+
+
+@pytest.mark.parametrize(
+    ("changed", "state"),
+    [
+        ({"velocity_ned_mps": (0.1, 0.0, 0.0)}, SectorState.OBSTACLE),
+        ({"position_ned_m": (3.0, 0.0, -FLYING_HEIGHT_M)}, SectorState.UNKNOWN),
+        ({"epoch": 1}, SectorState.UNKNOWN),
+    ],
+)
+def test_a_side_is_not_carried_over_a_jump_of_the_position(
+    monkeypatch: pytest.MonkeyPatch, changed: dict[str, Any], state: SectorState
+) -> None:
+    link = FakeLink(MonotonicClock())
+    standing = replace(link.telemetry_at(0), velocity_ned_mps=(0.0, 0.0, 0.0))
+    monkeypatch.setattr(link, "telemetry_at", lambda at_ns: replace(standing, at_ns=at_ns))
+    with looking(link, endless()) as (sides, perception):
+        wait_until(lambda: sides.added_to(look(perception, link)).scan.state[RIGHT] == SectorState.OBSTACLE)
+        main = look(perception, link)
+        jumped = replace(main, telemetry=replace(main.telemetry, **changed))
+        assert sides.added_to(jumped).scan.state[RIGHT] == state
 
 
 def test_a_side_that_dies_is_unknown_and_the_pilot_is_told() -> None:
