@@ -14,6 +14,9 @@ the earliest (measured)."""
 _WATCHED_NS = 5_000_000_000
 """A vehicle that begins to move so soon after the loss was held by what is lost."""
 
+_NEVER_STOPPED = frozenset({"LAND"})
+"""Every landing loses its metres near the ground: stopped there, the vehicle would hang in the air."""
+
 _MOVING_MPS = 0.5
 _RECOVERED_NS = 3_000_000_000
 """Distances must have been sent for so long before a new loss may lead to a new request."""
@@ -97,6 +100,8 @@ class HoldOnLoss:
 
 
 def _acts(autopilot: str | None, mode: str | None) -> bool:
-    """Whether distances do anything in a mode."""
+    """Whether distances do anything in a mode that may be left for a stop."""
+    if mode in _NEVER_STOPPED:
+        return False
     row = find_mode(autopilot, mode) if autopilot is not None and mode is not None else None
     return row is not None and row.effect is not Effect.NOTHING

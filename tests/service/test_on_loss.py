@@ -106,6 +106,7 @@ class TestWhenItIsAsked:
             ("ardupilot", "STABILIZE", 0),
             ("px4", "POSCTL", 1),
             ("px4", "OFFBOARD", 0),
+            ("px4", "LAND", 0),  # distances act on nudges; a landing is never stopped
             ("generic", "LOITER", 0),
         ],
     )
