@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import TypeVar
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,23 +13,13 @@ from uavdepth.band_view import BandView, seen_sectors
 from uavdepth.body_rays import body_rays
 from uavdepth.camera import CameraModel, CameraMount
 from uavdepth.errors import ImageSizeError, ScanError
+from uavdepth.joined_rows import mean_of_rows, nearest_of_rows, rows_together
 from uavdepth.level_ground import GROUND_DEPTH_SHARE, LevelGround, find_level_ground
-from uavdepth.obstacle_scan import SECTOR_WIDTH_DEG, ObstacleScan, SectorState, sector_bearings_deg
+from uavdepth.obstacle_scan import ObstacleScan, SectorState, sector_bearings_deg
 from uavdepth.range_histogram import RangeHistogram
+from uavdepth.required_pixels import pixels_of_line, pixels_of_thing, smallest_thing
 from uavdepth.sloping_ground import GroundProfile, SlopingGround
-
-SMALLEST_SIZE_M = 0.25
-"""Side of the square that must be found at maximum distance; sets the default of min_pixels."""
-
-SMALLEST_AREA_M2 = 0.01
-"""Nearer things must show this much of themselves: 2 cm of pole over half a metre."""
-
-LINE_SHARE = 0.6
-"""Share of an element's breadth that a wire has to cover in it and in its neighbours (see `RangeHistogram`);
-half of what makes the others may be lost as single pixels."""
-
-LARGEST_SHARE = 0.05
-"""But never more than this share of an element's pixels: something very near fills the view."""
+from uavdepth.speckles import SpeckleFilter
 
 FREE_SHARE = 0.7
 """Share of the band's height that must be seen free before an element is clear. The flight level
@@ -42,10 +31,6 @@ stop the vehicle for good."""
 
 _GROUND_STRIDE = 4
 _SLOPE_ROWS, _SLOPE_COLUMNS = 2, 8
-_ROWS_WORKED_ON = 160
-"""Rows are joined in groups, the nearest pixel of each group standing for it, until about so many are
-left: nothing near is lost, and the time of a scan does not grow with the picture's height."""
-
 _CHUNK = 32768
 """Points worked on at a time, so that the intermediate arrays stay in the processor's cache."""
 
@@ -53,8 +38,6 @@ _Ground = tuple[LevelGround | None, GroundProfile | None]
 """What is ground at any slope: the level below the vehicle, and what is seen to rise from there."""
 
 _Pixel = TypeVar("_Pixel", np.float32, np.bool_)
-
-_NEIGHBOURS = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], dtype=np.uint8)
 
 
 class ObstacleScanner:
@@ -86,8 +69,7 @@ class ObstacleScanner:
         min_distance_m: carried into the scan; nearer obstacles are still reported.
         max_distance_m: horizontal distance that the scan covers.
         below_m, above_m: the height band from the vehicle's origin, metres.
-        min_pixels: pixels that make an obstacle at maximum distance; None: a square of
-            `SMALLEST_SIZE_M` there, but at least 6.
+        min_pixels: pixels that make an obstacle at maximum distance; None: `smallest_thing`.
         ground_tolerance: relative error of depth that must not make an obstacle of the ground, 0 to
             0.5. What rises less than this share of the height is lost among the ground.
         max_ground_slope_deg: ground that rises no steeper is no obstacle, as far as its surface is seen and
@@ -143,19 +125,20 @@ class ObstacleScanner:
         self.below_m = float(below_m)
         self.above_m = float(above_m)
         self._ground_tolerance = ground_tolerance
-        self._together = max(1, round(camera.height / _ROWS_WORKED_ON))
+        self._together = rows_together(camera)
         rays = body_rays(camera, mount)
         self._rays = rays.reshape(3, -1)
-        self._joined_rays = _mean_of_rows(rays, self._together).reshape(3, -1)
+        self._joined_rays = mean_of_rows(rays, self._together).reshape(3, -1)
         self._ground_rays = body_rays(camera, mount, _GROUND_STRIDE).reshape(3, -1)
         self._slope_rays = np.ascontiguousarray(rays[:, 1::_SLOPE_ROWS, 4::_SLOPE_COLUMNS]).reshape(3, -1)
         self._sloping = SlopingGround(max_ground_slope_deg, max_distance_m, ground_tolerance)
         self._view = BandView(camera, mount, max_distance_m, below_m, above_m)
         self._histogram = RangeHistogram(max_distance_m, self._joined_rays.shape[1])
-        self._needed = self._needed_pixels(min_pixels)
-        self._line_needed = self._needed_of_line()
-        self._known = np.empty((camera.height, camera.width), dtype=np.float32)
-        self._neighbours = np.empty_like(self._known)
+        if min_pixels is None:
+            min_pixels = smallest_thing(camera, max_distance_m)
+        self._needed = pixels_of_thing(camera, self._histogram.edges_m, min_pixels, self._together)
+        self._line_needed = pixels_of_line(camera, mount, self._together)
+        self._speckles = SpeckleFilter(camera)
         self._bearings = sector_bearings_deg()
 
     def scan(
@@ -194,7 +177,7 @@ class ObstacleScanner:
         ground = self._ground(depth, level, height_m)
         rising = self._rising_ground(depth, level, ground)
 
-        joined = _nearest_of_rows(self._without_speckles(depth), self._together)
+        joined = nearest_of_rows(self._speckles.without(depth), self._together)
         distance = self._nearest(joined.ravel(), level, (ground, rising), self._told_shortening(shortening))
         clear = self._seen_free(depth.ravel(), level, (ground, rising), shortening)
         state = np.where(clear, SectorState.CLEAR, SectorState.UNKNOWN).astype(np.uint8)
@@ -216,17 +199,6 @@ class ObstacleScanner:
         joined = shortening[:: self._together].copy()  # doubt is smooth: one row stands for its group
         joined[~(joined <= LARGEST_SHORTENING)] = LARGEST_SHORTENING  # NaN too
         return np.maximum(joined, 0.0, out=joined).ravel()
-
-    def _without_speckles(self, depth: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Depth with unknown as +inf, and single pixels pushed back to the nearest of their neighbours.
-
-        A line one pixel wide, such as a thin pole or a wire, stays: its pixels have each other.
-        """
-        known, neighbours = self._known, self._neighbours
-        known.fill(np.inf)
-        np.copyto(known, depth, where=depth > 0)
-        cv2.erode(known, _NEIGHBOURS, dst=neighbours)
-        return np.maximum(known, neighbours, out=known)
 
     def _nearest(
         self,
@@ -322,41 +294,3 @@ class ObstacleScanner:
         sparse = np.where(sparse > 0, sparse, np.float32(np.nan))
         points, range_m = self._level_points(self._slope_rays, sparse, level)
         return self._sloping.find(points, range_m, ground)
-
-    def _needed_pixels(self, min_pixels: int | None) -> NDArray[np.int64]:
-        """(bins,) joined pixels that make an obstacle at each distance of the histogram."""
-        pixels_at_1m = self.camera.fx * self.camera.fy
-        if min_pixels is None:
-            min_pixels = max(6, round(pixels_at_1m * (SMALLEST_SIZE_M / self.max_distance_m) ** 2))
-        element = self.camera.fx * math.radians(SECTOR_WIDTH_DEG) * self.camera.height
-        shown = pixels_at_1m * SMALLEST_AREA_M2 / np.square(self._histogram.edges_m[:-1].astype(np.float64))
-        most = max(min_pixels, int(LARGEST_SHARE * element))
-        return np.ceil(np.clip(shown, min_pixels, most) / self._together).astype(np.int64)
-
-    def _needed_of_line(self) -> NDArray[np.int64]:
-        """(72,) joined pixels of a level line one pixel thin in each element, times `LINE_SHARE`."""
-        camera = self.camera
-        aside = np.radians((sector_bearings_deg().astype(np.float64) - self.mount.yaw_deg + 180) % 360 - 180)
-        # Pixels lie the denser in angle the farther from the middle; 80 degrees off none has any.
-        stretch = 1 / np.square(np.maximum(np.cos(aside), 0.17))
-        on_its_side = abs(math.sin(math.radians(self.mount.roll_deg))) > 0.7
-        across = camera.fy / self._together if on_its_side else camera.fx
-        breadth = across * math.radians(SECTOR_WIDTH_DEG) * stretch
-        return np.maximum(np.ceil(LINE_SHARE * breadth), 4).astype(np.int64)
-
-
-def _nearest_of_rows(depth: NDArray[np.float32], together: int) -> NDArray[np.float32]:
-    """(ceil(H / together), W) smallest depth of each group of rows."""
-    nearest = depth[::together].copy()
-    for row in range(1, together):
-        part = depth[row::together]
-        np.minimum(nearest[: len(part)], part, out=nearest[: len(part)])
-    return nearest
-
-
-def _mean_of_rows(rays: NDArray[np.float32], together: int) -> NDArray[np.float32]:
-    """(3, ceil(H / together), W) mean direction of each group of rows of (3, H, W)."""
-    groups = np.arange(0, rays.shape[1], together)
-    sizes = np.diff(np.append(groups, rays.shape[1]))
-    total = np.add.reduceat(rays.astype(np.float64), groups, axis=1)
-    return np.ascontiguousarray(total / sizes[:, None], dtype=np.float32)
