@@ -68,7 +68,7 @@ def open_session(
     }
     if security is not None:
         security.check(listen, connect)
-        options |= security.options()
+        options |= security.options(connect)
     try:
         for option, value in options.items():
             config.insert_json5(option, json.dumps(value))

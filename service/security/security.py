@@ -90,8 +90,12 @@ class Security:
         """
         return None if self.certificates is None else validity_problem(self.certificates.certificate)
 
-    def options(self) -> dict[str, Any]:
+    def options(self, connect: Sequence[str] = ()) -> dict[str, Any]:
         """Zenoh's configuration keys and values.
+
+        Args:
+            connect: endpoints that the session connects to. Who is reached there shows a certificate and
+                never a user, so in such a session the access list goes by certificates alone.
 
         Raises:
             SecurityError: a password file that cannot be read.
@@ -116,7 +120,7 @@ class Security:
             check_private(self.users_file, "users_file")
             options["transport/auth/usrpwd/dictionary_file"] = str(self.users_file)
         if self.access is not None:
-            options["access_control"] = self.access.as_zenoh(
-                by_certificate=self.certificates is not None, by_user=self.users_file is not None
-            )
+            by_certificate = self.certificates is not None
+            by_user = self.users_file is not None and not (by_certificate and connect)
+            options["access_control"] = self.access.as_zenoh(by_certificate=by_certificate, by_user=by_user)
         return options

@@ -63,6 +63,40 @@ def test_a_fleets_own_files_bring_vehicle_router_and_viewer_together(
         running.join()
 
 
+def test_two_routers_and_a_vehicle_with_an_address_of_its_own_hand_on_both_ways(tmp_path: Path) -> None:
+    members = (
+        Member("hub", "router", ("127.0.0.1",)),
+        Member("far", "router", ("127.0.0.1",)),
+        Member("kite", "vehicle", ("127.0.0.1",)),
+        Member("desk", "viewer"),
+    )
+    FleetFolder(tmp_path / "fleet", members, 10, passwords=True, target=None).make(force=False)
+    hub, far, kite, desk = (
+        load_zenoh_settings(tmp_path / "fleet" / member.name / "zenoh.toml").security for member in members
+    )
+    near_end, far_end = (f"tls/127.0.0.1:{free_port()}" for _ in range(2))
+    with (
+        open_session([near_end], [], hub, Role.STATION),
+        open_session([far_end], [near_end], far, Role.STATION),
+        open_session([], [far_end], kite) as vehicle,
+        open_session([], [near_end], desk, Role.STATION) as station,
+    ):
+        scans: list[str] = []
+        reports: list[str] = []
+        station.declare_subscriber(keys.key("*", keys.SCAN), lambda s: scans.append(str(s.key_expr)))
+        received = keys.key("kite", keys.RECEIVED)
+        vehicle.declare_subscriber(received, lambda s: reports.append(str(s.key_expr)))
+
+        def speak() -> bool:
+            vehicle.put(keys.key("kite", keys.SCAN), b"x")
+            station.put(received, b"x")
+            return bool(scans) and bool(reports)
+
+        wait_until(speak)
+        assert set(scans) == {keys.key("kite", keys.SCAN)}
+        assert set(reports) == {received}
+
+
 def test_a_port_in_use_ends_the_router_with_its_name(interrupt: Callable[[], None]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as blocker:
         endpoint = f"tcp/127.0.0.1:{blocker.getsockname()[1]}"
