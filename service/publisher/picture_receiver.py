@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 
 import zenoh
@@ -53,6 +54,7 @@ class PictureReceiver:
         self._clock = clock
         self._unreadable = unreadable
         self._decoder = VideoDecoder()
+        self._lock = threading.Lock()
         report_key = keys.key(vehicle, keys.RECEIVED)
         self._reporter = ReceivedReporter(lambda report: session.put(report_key, report))
         self._subscribers = [
@@ -70,6 +72,11 @@ class PictureReceiver:
 
     def receive(self, key: str, payload: bytes, attachment: bytes | None) -> None:
         """Take one sample, which need not be what its key says."""
+        # Samples of two peers under one name come in two threads, and FFmpeg's decoder is for one.
+        with self._lock:
+            self._take(key, payload, attachment)
+
+    def _take(self, key: str, payload: bytes, attachment: bytes | None) -> None:
         topic = key.rpartition("/")[2]
         try:
             header = _HEADERS[topic].decode(attachment or b"")

@@ -19,7 +19,7 @@ from service.publisher.picture_source import PictureSource
 from service.publisher.rate_limit import RateLimit
 from service.publisher.received import ReceivedReport
 from service.publisher.topics import PictureTopics
-from service.publisher.wire import Intrinsics, WireError
+from service.publisher.wire import MAX_SAMPLE_BYTES, Intrinsics, WireError
 from service.settings.zenoh import ZenohSettings
 from service.thread_rank import stand_back
 
@@ -125,14 +125,20 @@ class PictureThread:
                     newest = None
                     log.exception("zenoh pictures broke")
                     self.problem = f"zenoh: {type(error).__name__}: {error}"
-                    self._topics.clear()
-                    self._watched.clear()
+                    self._forget_topics()
                     if self._line is not None:
                         self._line.drop(self.problem)
                     self._stopping.wait(_RETRY_S)
         finally:
             if self._line is not None:
                 self._line.close()
+
+    def _forget_topics(self) -> None:
+        """Declare anew what is sent and heard, on sessions that may live on."""
+        for topics in self._topics.values():
+            topics.close()
+        self._topics.clear()
+        self._watched.clear()
 
     def _look(self, now_ns: int, *, is_due: bool) -> None:
         """Keep the session, and notice who watches."""
@@ -153,14 +159,16 @@ class PictureThread:
             self.budget = self._new_budget()
 
     def _declare(self, session: zenoh.Session) -> PictureTopics:
-        session.declare_subscriber(
-            keys.key(self._vehicle, keys.RECEIVED),
-            lambda sample: self._reports.append(sample.payload.to_bytes()),
-        )
-        return PictureTopics(session, self._vehicle)
+        return PictureTopics(session, self._vehicle, self._report)
+
+    def _report(self, sample: zenoh.Sample) -> None:
+        """From Zenoh's threads: keep a report that is not too long to be one."""
+        if len(sample.payload) <= MAX_SAMPLE_BYTES:
+            self._reports.append(sample.payload.to_bytes())
 
     def _hear(self, now_ns: int) -> None:
-        while self._reports:
+        # No more than were there at once: whoever sends them without end must not hold up the pictures.
+        for _ in range(len(self._reports)):
             try:
                 report = ReceivedReport.decode(self._reports.popleft())
             except WireError:

@@ -18,6 +18,9 @@ _LEASE_MS = 2000
 SEND_BUFFER_BYTES = 16_384
 """With the system's own buffers a link of 2 Mbit/s ran 3.2 s late, with this one 0.4 s (measured)."""
 
+MAX_MESSAGE_BYTES = 4_194_304
+"""No picture is near it; by default a peer may have a gigabyte of memory reserved for one message."""
+
 _SOURCE_PLACE = re.compile(r" at \S+\.rs:\d+\.?\]?")
 
 
@@ -63,6 +66,7 @@ def open_session(
         # Drops samples without a word (eclipse-zenoh/zenoh #2628).
         "transport/shared_memory/enabled": False,
         "transport/link/tx/lease": _LEASE_MS,
+        "transport/link/rx/max_message_size": MAX_MESSAGE_BYTES,
         "transport/link/tcp/so_sndbuf": SEND_BUFFER_BYTES,
         "transport/link/tls/so_sndbuf": SEND_BUFFER_BYTES,
     }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import zenoh
@@ -24,9 +26,20 @@ class ScanTopics:
 
 
 class PictureTopics:
-    """Depth, video and camera pictures, for as long as the session lives."""
+    """Depth, video and camera pictures, for as long as the session lives or until `close`.
 
-    def __init__(self, session: zenoh.Session, vehicle: str) -> None:
+    Args:
+        session: where they go.
+        vehicle: its name.
+        report: takes what ground stations say has arrived; called from Zenoh's threads. None: nobody does.
+    """
+
+    def __init__(
+        self, session: zenoh.Session, vehicle: str, report: Callable[[zenoh.Sample], None] | None = None
+    ) -> None:
+        self._reports: zenoh.Subscriber[None] | None = None
+        if report is not None:
+            self._reports = session.declare_subscriber(keys.key(vehicle, keys.RECEIVED), report)
         self._publishers = {
             keys.DEPTH: _declare(session, vehicle, keys.DEPTH, zenoh.Encoding.IMAGE_PNG),
             keys.VIDEO: _declare(session, vehicle, keys.VIDEO, zenoh.Encoding.VIDEO_H264),
@@ -42,6 +55,15 @@ class PictureTopics:
     def put(self, topic: str, payload: bytes, attachment: bytes) -> None:
         """Send one picture."""
         self._publishers[topic].put(payload, attachment=attachment)
+
+    def close(self) -> None:
+        """Take back what was declared: the session may go on. Never raises."""
+        for publisher in self._publishers.values():
+            with suppress(zenoh.ZError):
+                publisher.undeclare()  # type: ignore[no-untyped-call]
+        if self._reports is not None:
+            with suppress(zenoh.ZError):
+                self._reports.undeclare()  # type: ignore[no-untyped-call]
 
 
 def _declare(

@@ -20,7 +20,8 @@ from service.frame import Frame
 from service.pipeline import PerceptionResult, unknown_scan
 from service.publisher.picture_receiver import PictureReceiver
 from service.publisher.publisher import ZenohPublisher
-from service.publisher.session import Role, open_session
+from service.publisher.session import MAX_MESSAGE_BYTES, Role, open_session
+from service.publisher.topics import PictureTopics
 from service.publisher.wire import CameraHeader, DepthHeader, ScanSample, StatusSample
 from service.scale_status import ScaleStatus
 from service.security.errors import SecurityError
@@ -195,6 +196,38 @@ def test_what_is_not_understood_as_a_report_changes_nothing() -> None:
 
             wait_until(offer)
         assert publisher.status.detail == ""
+
+
+def test_what_is_far_too_large_is_not_even_received() -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    with open_session([endpoint], []) as vehicle, open_session([], [endpoint]) as hostile:
+        sizes: list[int] = []
+        vehicle.declare_subscriber("uavdepth/kite/received", lambda sample: sizes.append(len(sample.payload)))
+
+        def put() -> bool:
+            hostile.put("uavdepth/kite/received", bytes(MAX_MESSAGE_BYTES + 100_000))
+            hostile.put("uavdepth/kite/received", b"x")
+            return len(sizes) >= 2
+
+        wait_until(put)
+        assert set(sizes) == {1}
+
+
+def test_topics_that_are_declared_anew_hear_each_report_once() -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    with open_session([endpoint], []) as session, open_session([], [endpoint]) as station:
+        heard: list[str] = []
+        for name in ("first", "second", "third"):
+            topics = PictureTopics(session, "kite", lambda _sample, name=name: heard.append(name))
+            if name != "third":
+                topics.close()
+
+        def put() -> bool:
+            station.put("uavdepth/kite/received", b"x")
+            return len(heard) >= 2
+
+        wait_until(put)
+        assert set(heard) == {"third"}
 
 
 def test_certificates_that_cannot_be_used_stop_the_program_with_the_file(tmp_path: Path) -> None:
