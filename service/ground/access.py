@@ -109,7 +109,10 @@ class Access:
         """Whether a request comes from this station's own page, or from a program that is no browser."""
         if origin is None:
             return True
-        parts = urlsplit(origin)
+        try:
+            parts = urlsplit(origin)
+        except ValueError:
+            return False
         return (
             parts.scheme in ("http", "https") and bool(host) and parts.netloc.lower() == (host or "").lower()
         )

@@ -35,7 +35,8 @@ class Tls:
         """Raises GroundError for files that are missing, unreadable or no pair."""
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
         try:
-            context.load_cert_chain(self.certificate, self.key)
+            # Without a password function an encrypted key would have OpenSSL ask at the terminal.
+            context.load_cert_chain(self.certificate, self.key, password=lambda: "")
         except (OSError, ssl.SSLError) as error:
             reason = error.strerror or error
             raise GroundError(

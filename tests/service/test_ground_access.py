@@ -5,11 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from cryptography.hazmat.primitives import serialization
+from cryptography.hazmat.primitives.asymmetric import ec
 
 from service.errors import ConfigError
 from service.ground.access import Access, check_token, is_loopback, make_token
 from service.ground.errors import GroundError
 from service.ground.station import StationSettings
+from service.security.certificates import Authority
 
 
 def settings_with(**changes: object) -> StationSettings:
@@ -77,6 +80,21 @@ def test_options_that_cannot_be_used_are_named(changes: dict[str, object], words
         settings_with(**changes)
 
 
+def test_an_encrypted_key_is_refused_and_nobody_is_asked_for_its_password(tmp_path: Path) -> None:
+    key = ec.generate_private_key(ec.SECP256R1())
+    pair = Authority.new(10).pair
+    (tmp_path / "page.pem").write_bytes(pair.certificate)
+    (tmp_path / "page.key").write_bytes(
+        key.private_bytes(
+            serialization.Encoding.PEM,
+            serialization.PrivateFormat.PKCS8,
+            serialization.BestAvailableEncryption(b"secret"),
+        )
+    )
+    with pytest.raises(ConfigError, match=r"page\.key cannot be used"):
+        settings_with(certificate=tmp_path / "page.pem", key=tmp_path / "page.key")
+
+
 def test_made_tokens_pass_the_check_and_differ() -> None:
     assert len({check_token(make_token()) for _ in range(50)}) == 50
     with pytest.raises(GroundError):
@@ -124,6 +142,8 @@ def test_a_foreign_name_that_points_here_is_refused(host: str | None, expected: 
         ("http://evil.example", False),
         ("null", False),
         ("file://127.0.0.1:8080", False),
+        ("http://[", False),
+        ("http://[127.0.0.1", False),
     ],
 )
 def test_a_foreign_page_is_refused(origin: str | None, expected: bool) -> None:
