@@ -176,3 +176,9 @@ def test_a_png_that_claims_to_be_huge_is_refused_before_memory_is_taken() -> Non
     data[16:24] = (30_000).to_bytes(4, "big") * 2
     with pytest.raises(DepthCodecError, match="30000x30000 pixels"):
         decode_depth_png(bytes(data), 0.5, 60.0)
+
+
+def test_no_other_format_is_read_in_place_of_a_png() -> None:
+    jpeg = cv2.imencode(".jpg", np.full((4, 4), 100, np.uint8))[1].tobytes()
+    with pytest.raises(DepthCodecError, match="a PNG is needed"):
+        decode_depth_png(jpeg, 0.5, 60.0)
