@@ -52,14 +52,14 @@ class Member:
         hosts = tuple(host for host in rest.split(",") if host)
         if role == "router" and not hosts:
             hosts, name = (name,), re.sub(r"[^A-Za-z0-9_-]", "-", name)
-        if not re.match(VEHICLE_NAME_PATTERN, name) or len(name) > 64:
+        if not re.fullmatch(VEHICLE_NAME_PATTERN, name) or len(name) > 64:
             raise SecurityError(
                 f"--{role} {text!r}: {name!r} is no name: 1 to 64 letters, digits, `_` and `-` are needed"
             )
         if name == _AUTHORITY:
             raise SecurityError(f"--{role} {text!r}: {name!r} is the folder of the authority: choose another")
         for host in hosts:
-            if not _HOST.match(host):
+            if not _HOST.fullmatch(host):
                 raise SecurityError(f"--{role} {text!r}: {host!r} is neither a host name nor an address")
         if role == "viewer" and hosts:
             raise SecurityError(

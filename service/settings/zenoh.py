@@ -19,7 +19,7 @@ _ENDPOINT_FORM = "tcp/HOST:PORT, tls/HOST:PORT or udp/HOST:PORT"
 
 def check_endpoint(endpoint: str) -> str:
     """`endpoint` unchanged. Raises ValueError if it is not of Zenoh's form, `tcp/host:port`."""
-    match = _ENDPOINT.match(endpoint)
+    match = _ENDPOINT.fullmatch(endpoint)
     if match is None:
         raise ValueError(f"{endpoint!r} is no endpoint: {_ENDPOINT_FORM} is needed")
     if not 1 <= int(match[3]) <= 65535:
@@ -29,7 +29,7 @@ def check_endpoint(endpoint: str) -> str:
 
 def check_name(name: str) -> str:
     """`name` unchanged. Raises ValueError if no vehicle, viewer or router can be called so."""
-    if not re.match(VEHICLE_NAME_PATTERN, name) or len(name) > 64:
+    if not re.fullmatch(VEHICLE_NAME_PATTERN, name) or len(name) > 64:
         raise ValueError(f"{name!r} is no name: 1 to 64 letters, digits, `_` and `-` are needed")
     return name
 
