@@ -129,7 +129,7 @@ def test_obstacle_clear_and_unknown_are_told_apart(running: RunningStation, tab:
 def test_a_killed_vehicle_turns_stale_and_then_no_data(running: RunningStation, tab: Tab) -> None:
     wren = Vehicle(running.vehicles, "wren")
     state = "document.getElementById('vehicle').dataset.freshness"
-    row = "document.querySelector('li[data-name=wren]').dataset.freshness"
+    row = "document.querySelector('li[data-name=wren]')?.dataset.freshness"
     talk = Talk(wren.say)
     with talk:
         tab.open(f"{running.url}/#vehicle=wren")
@@ -168,7 +168,7 @@ def test_twenty_vehicles_are_listed_and_the_keyboard_goes_through_them(
         tab.press("ArrowDown")
         tab.wait_for(is_text("#name", "v01"))
         tab.press("End")
-        selected = "document.querySelector('li[aria-selected=true]').dataset.name"
+        selected = "document.querySelector('li[aria-selected=true]')?.dataset.name"
         names = tab.evaluate("[...document.querySelectorAll('#vehicles li')].map(li => li.dataset.name)")
         tab.wait_for(f"{selected} === {json.dumps(names[-1])}")
         tab.press("ArrowUp")
