@@ -160,6 +160,12 @@ def test_what_is_ahead_is_told_nearer_by_the_way_flown_since_the_picture() -> No
     assert min(message.distances) == pytest.approx(800 - 500 * 0.202, abs=2)
 
 
+def test_the_way_of_the_message_itself_is_made_good_too() -> None:
+    flight = Turning(north_mps=5.0, trip_ms=60)
+    flight.fly(3.0)
+    assert min(flight.tell(pole(0.0, 8.0), age_ms=200).distances) == pytest.approx(800 - 500 * 0.230, abs=5)
+
+
 def test_the_way_is_made_good_up_to_the_moment_of_leaving_not_of_queueing() -> None:
     flight = Turning(north_mps=5.0)
     flight.fly(3.0)

@@ -27,7 +27,7 @@ from uavdepth.camera import CameraModel
 from uavdepth.depth_map import DepthMap
 from uavdepth.hints import Hints
 from uavdepth.model_card import CARD_METADATA_KEY
-from uavdepth.obstacle_scan import SectorState
+from uavdepth.obstacle_scan import ObstacleScan, SectorState
 from uavdepth.providers import PROVIDERS, OpenedSession, ProviderUnavailableError
 from uavdepth.scanner import ObstacleScanner
 
@@ -230,6 +230,24 @@ def test_without_a_rangefinder_the_ekf_tells_the_height_near_the_start_and_no_fu
     far = perception.step(frame_at(2.0), at(2 * SECOND, height_m=None, position_ned_m=(80.0, 0.0, -10.0)))
     assert far.trouble is Trouble.NO_HEIGHT
     assert model.told[-1] == Hints()
+
+
+@pytest.mark.parametrize(("rangefinder_m", "removed_m"), [(4.0, 4.0), (None, None)])
+def test_ground_is_taken_out_of_the_scan_by_the_rangefinder_alone(
+    rangefinder_m: float | None, removed_m: float | None
+) -> None:
+    """The EKF knows of no hill: what it calls ground may be the top of a house."""
+    heights: list[float | None] = []
+
+    class Listening(ObstacleScanner):
+        def scan(self, depth_m, attitude, height_m=None, relative_sigma=None) -> ObstacleScan:  # type: ignore[no-untyped-def]
+            heights.append(height_m)
+            return super().scan(depth_m, attitude, height_m, relative_sigma)
+
+    settings = make_settings("motion.points=false", "scale.height_source=both")
+    perception = Perception(settings, HintedDepth(), None, Listening(CAMERA, MOUNT))
+    perception.step(frame_at(1.0), at(SECOND, height_m=rangefinder_m, position_ned_m=(0.0, 0.0, -4.0)))
+    assert heights == [removed_m]
 
 
 def test_what_an_autopilot_said_before_it_started_anew_is_forgotten() -> None:

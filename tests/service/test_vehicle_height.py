@@ -36,6 +36,18 @@ def test_a_reading_is_held_and_moved_by_the_climb() -> None:
     assert height.at(at(3.1, None)) is None
 
 
+def test_a_held_reading_is_doubted_with_the_way_flown_since() -> None:
+    def sigma_after(north_m: float) -> float:
+        height = VehicleHeight("rangefinder", 2.0)
+        height.at(at(1.0, 4.0))
+        held = height.at(at(2.0, None, (north_m, 0.0, -10.0)))
+        assert held is not None
+        return held.relative_sigma
+
+    assert sigma_after(0.0) < 0.05
+    assert sigma_after(20.0) > 0.25
+
+
 def test_after_the_rangefinder_the_ekf_goes_on_from_its_last_ground_and_doubts_more_with_the_way() -> None:
     height = VehicleHeight("both", 2.0)
     height.at(at(1.0, 7.0))  # ground 3 m above the place of the start

@@ -52,6 +52,13 @@ class TestDoubt:
         assert scan.state[element(0)] == UNKNOWN
         assert (scan.state[[element(-10), element(10)]] == CLEAR).all()
 
+    @pytest.mark.parametrize("sigma", [1.0, 3.0, 1e6, math.inf, -3.0, math.nan])
+    def test_r7_depth_that_may_be_anything_is_not_clear(self, camera, mount, level, sigma):
+        """Three standard deviations of 100 % put a far point far behind the camera: no way is free by that."""
+        far = np.full((320, 640), 1000.0, np.float32)
+        scan = ObstacleScanner(camera, mount).scan(far, level, None, np.full_like(far, sigma))
+        assert (scan.state == UNKNOWN).all()
+
     def test_one_unknown_pixel_in_a_hundred_leaves_clear_clear(self, camera, mount, level):
         depth = np.full((320, 640), np.inf, np.float32)
         depth[np.random.default_rng(3).random(depth.shape) < 0.01] = np.nan
