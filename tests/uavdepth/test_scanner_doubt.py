@@ -9,10 +9,7 @@ import pytest
 from elements import attitude_deg, element, obstacles
 from solids import depth_of, ground, pole, wall
 
-from uavdepth import (
-    ObstacleScanner,
-    SectorState,
-)
+from uavdepth import CameraMount, ObstacleScanner, SectorState
 
 OBSTACLE, CLEAR, UNKNOWN = SectorState.OBSTACLE, SectorState.CLEAR, SectorState.UNKNOWN
 
@@ -35,6 +32,14 @@ class TestDoubt:
         scan = ObstacleScanner(camera, mount).scan(depth, level)
         assert obstacles(scan) == [element(45)]
 
+    @pytest.mark.parametrize("bearing", [178.5, -178.5])
+    def test_a_pole_on_either_side_of_straight_behind_is_found_and_doubted(self, camera, level, bearing):
+        rear = CameraMount(yaw_deg=180.0)
+        depth = depth_of([pole(bearing, 6.0, 0.05)], camera, rear, level)
+        scan = ObstacleScanner(camera, rear).scan(depth, level, None, np.full_like(depth, 0.25))
+        assert obstacles(scan) == [element(180)]
+        assert scan.distance_m[element(180)] == pytest.approx(4.5, rel=0.03)
+
     def test_r7_unknown_depth_is_unknown(self, camera, mount, level):
         scan = ObstacleScanner(camera, mount).scan(np.full((320, 640), np.nan, np.float32), level, 5.0)
         assert (scan.state == UNKNOWN).all()
@@ -54,7 +59,7 @@ class TestDoubt:
 
     @pytest.mark.parametrize("sigma", [1.0, 3.0, 1e6, math.inf, -3.0, math.nan])
     def test_r7_depth_that_may_be_anything_is_not_clear(self, camera, mount, level, sigma):
-        """Three standard deviations of 100 % put a far point far behind the camera: no way is free by that."""
+        """Three standard deviations of 100 % put a far point far behind the camera: that frees no way."""
         far = np.full((320, 640), 1000.0, np.float32)
         scan = ObstacleScanner(camera, mount).scan(far, level, None, np.full_like(far, sigma))
         assert (scan.state == UNKNOWN).all()
