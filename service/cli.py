@@ -14,6 +14,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from service.errors import ConfigError
+from service.process_end import end_process
 from uavdepth.errors import UavDepthError
 
 EXIT_FAILURE = 1
@@ -119,7 +120,15 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 
     Exit codes: 0 done, 1 a failure at run time, 2 a wrong configuration or command line.
     """
-    words = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        _run(list(sys.argv[1:] if arguments is None else arguments))
+    except SystemExit as end:
+        if arguments is not None:
+            raise
+        end_process(end.code if isinstance(end.code, int) else EXIT_FAILURE)
+
+
+def _run(words: list[str]) -> NoReturn:
     wanted = next((word for word in words if not word.startswith("-")), None)
     try:
         build_app(wanted)(words, prog_name="uavdepth")

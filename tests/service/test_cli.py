@@ -279,6 +279,24 @@ def test_run_ends_cleanly_when_told_to(tmp_path: Path, number: signal.Signals) -
 # -- watch
 
 
+@pytest.mark.parametrize(("thread", "taken_down"), [("zenoh-scan", False), ("camera", True)])
+def test_an_interpreter_is_not_taken_down_under_a_thread_that_is_inside_zenoh(
+    thread: str, taken_down: bool
+) -> None:
+    program = (
+        "import atexit, threading\n"
+        "from service.process_end import end_process\n"
+        f"threading.Thread(target=threading.Event().wait, name={thread!r}, daemon=True).start()\n"
+        "atexit.register(print, 'taken down')\n"
+        "print('done')\n"
+        "end_process(3)\n"
+    )
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert ended.returncode == 3
+    assert ended.stdout.split("\n")[0] == "done"
+    assert ("taken down" in ended.stdout) is taken_down
+
+
 def test_watch_once_without_a_vehicle_is_exit_code_1() -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     done = uavdepth("watch", "--once", "--json", "--timeout", "0.2", "--connect", endpoint)
