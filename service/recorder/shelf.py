@@ -13,7 +13,7 @@ from service.errors import RecordError
 from service.settings.record import RecordSettings
 
 _MIB = 1024 * 1024
-_OURS = re.compile(r"^uavdepth-[A-Za-z0-9_-]+-\d{8}T\d{6}Z(-\d+)?-\d{3}\.(mcap|tlog)$")
+_OURS = re.compile(r"^uavdepth-[A-Za-z0-9_-]+-\d{8}T\d{6}Z(-\d+)?-\d{3,}\.(mcap|tlog)$")
 """What the recorder names its files: only these are ever deleted."""
 
 

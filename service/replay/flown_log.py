@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Sequence
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -113,13 +115,19 @@ def _truth_rows(log: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         raise RecordError(f"{log}: no such file")
     attitudes: list[tuple[float, ...]] = []
     positions: list[tuple[float, ...]] = []
-    reader = DFReader.DFReader_binary(str(log))
-    while (row := reader.recv_match(type=["SIM", "SIM2"])) is not None:
-        at_s = row.TimeUS * 1e-6
-        if row.get_type() == "SIM":
-            attitudes.append((at_s, *(math.radians(angle) for angle in (row.Roll, row.Pitch, row.Yaw))))
-        else:
-            positions.append((at_s, row.PN, row.PE, row.PD))
+    try:
+        # What it has to say of damaged rows it prints.
+        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+            reader = DFReader.DFReader_binary(str(log))
+            while (row := reader.recv_match(type=["SIM", "SIM2"])) is not None:
+                at_s = row.TimeUS * 1e-6
+                if row.get_type() == "SIM":
+                    angles = (math.radians(angle) for angle in (row.Roll, row.Pitch, row.Yaw))
+                    attitudes.append((at_s, *angles))
+                else:
+                    positions.append((at_s, row.PN, row.PE, row.PD))
+    except Exception as error:  # pymavlink raises Exception itself, and all kinds of others
+        raise RecordError(f"{log}: is no dataflash log that can be read ({error})") from error
     if min(len(attitudes), len(positions)) < 2:
         raise RecordError(f"{log}: holds no SIM and SIM2 rows: it is no log of a simulated flight")
     turned = np.array(attitudes)

@@ -30,6 +30,7 @@ from service.recorder.perception_note import PerceptionNote
 from service.recorder.record_writer import RecordWriter
 from service.recorder.recorder import Recorder
 from service.recorder.recover import recover
+from service.recorder.shelf import Shelf
 from service.recorder.tlog_writer import PacketCutter
 from service.replay.recording import depth_of, image_of
 from service.run import Service
@@ -198,6 +199,15 @@ def test_a_full_folder_that_may_not_be_thinned_stops_the_recording_in_words(tmp_
     assert not status.recording
     assert "3 MiB of records, max_total_mib is 2" in status.problem
     assert full.exists()
+
+
+def test_the_thousandth_part_of_a_record_is_counted_and_deleted_too(tmp_path: Path) -> None:
+    settings = record_settings(tmp_path, "record.max_total_mib=2").record
+    old = tmp_path / "uavdepth-uav1-20250101T000000Z-1000.mcap"
+    old.write_bytes(b"x" * 3 * 1024 * 1024)
+    shelf = Shelf(settings, "uav1")
+    shelf.make_room(shelf.new_take(WALL_NS), 1)
+    assert not old.exists()
 
 
 class StuckWriter(RecordWriter):

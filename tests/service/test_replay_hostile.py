@@ -26,6 +26,7 @@ from service.recorder.perception_note import PerceptionNote
 from service.recorder.record_reader import RecordReader
 from service.recorder.recover import recover
 from service.replay.dataflash_file import read_dataflash
+from service.replay.flown_log import FlownLog
 from service.replay.golden import load_golden
 from service.replay.protobuf_fields import protobuf_fields
 from service.replay.recording import Recording, depth_of, image_of
@@ -214,3 +215,13 @@ def test_what_is_wrong_with_a_golden_file_is_said(tmp_path: Path, change: dict[s
         load_golden(path)
     with pytest.raises(RecordError, match="no such file; --update makes it"):
         load_golden(tmp_path / "none.json")
+
+
+@pytest.mark.parametrize(
+    ("data", "words"), [(b"", "no dataflash log"), (b"\xa3\x95" * 50, "no SIM and SIM2")]
+)
+def test_a_simulated_flight_whose_log_is_damaged_is_refused(tmp_path: Path, data: bytes, words: str) -> None:
+    log = tmp_path / "flight.BIN"
+    log.write_bytes(data)
+    with pytest.raises(RecordError, match=words):
+        FlownLog(LOGS / "A_hover_and_forward.tlog", [log])
