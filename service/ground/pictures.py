@@ -25,13 +25,17 @@ _SCAN_MARKER = 0xDA
 _MAX_SEGMENTS = 200
 
 
-def check_jpeg(data: bytes) -> tuple[int, int]:
+def check_jpeg(data: bytes, max_bytes: int = MAX_PICTURE_BYTES) -> tuple[int, int]:
     """Width and height of a JPEG by its header.
+
+    Args:
+        data: need not be trusted.
+        max_bytes: more are refused.
 
     Raises:
         PictureError: no JPEG, one without a size, or one that is too large.
     """
-    _check_bytes(data)
+    _check_bytes(data, max_bytes)
     if not data.startswith(_JPEG_START):
         raise PictureError(f"the picture starts with {data[:4]!r}: no JPEG")
     at = len(_JPEG_START)
@@ -63,7 +67,7 @@ def check_grey_png(data: bytes) -> tuple[int, int]:
     Raises:
         PictureError: no PNG, another kind of PNG, or one that is too large.
     """
-    _check_bytes(data)
+    _check_bytes(data, MAX_PICTURE_BYTES)
     if len(data) < _PNG_HEADER_BYTES or not data.startswith(_PNG_START):
         raise PictureError(f"the picture starts with {data[:8]!r}: no PNG")
     width, height, bits, kind = struct.unpack_from(">IIBB", data, len(_PNG_START))
@@ -72,9 +76,9 @@ def check_grey_png(data: bytes) -> tuple[int, int]:
     return _check_size(width, height)
 
 
-def _check_bytes(data: bytes) -> None:
-    if len(data) > MAX_PICTURE_BYTES:
-        raise PictureError(f"a picture of {len(data)} bytes: at most {MAX_PICTURE_BYTES} are shown")
+def _check_bytes(data: bytes, max_bytes: int) -> None:
+    if len(data) > max_bytes:
+        raise PictureError(f"a picture of {len(data)} bytes: at most {max_bytes} are shown")
 
 
 def _check_size(width: int, height: int) -> tuple[int, int]:

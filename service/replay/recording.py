@@ -13,6 +13,8 @@ from mcap.records import Attachment, Channel, Message, Metadata
 from numpy.typing import NDArray
 
 from service.errors import RecordError
+from service.ground.errors import PictureError
+from service.ground.pictures import check_jpeg
 from service.recorder import layout
 from service.recorder.perception_note import PerceptionNote
 from service.recorder.record_reader import RecordReader
@@ -20,6 +22,7 @@ from service.replay.footage import Packets, RecordedPicture
 from service.replay.protobuf_fields import protobuf_fields
 
 _MAX_PIXELS = 4096 * 4096
+_MAX_PICTURE_BYTES = 3 * _MAX_PIXELS
 _MAX_CONFIGURATION_BYTES = 1_000_000
 _IMAGE_DATA = 2
 _RAW_WIDTH, _RAW_HEIGHT, _RAW_ENCODING, _RAW_STEP, _RAW_DATA = 2, 3, 4, 5, 6
@@ -177,7 +180,11 @@ def image_of(data: bytes) -> NDArray[np.uint8]:
     if not isinstance(jpeg, bytes) or not jpeg:
         raise RecordError("a recorded picture is empty")
     try:
+        # OpenCV takes 10 s and gigabytes for a few hundred bytes that claim to be huge.
+        check_jpeg(jpeg, _MAX_PICTURE_BYTES)
         image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+    except PictureError as error:
+        raise RecordError(f"a recorded picture cannot be decoded: {error}") from error
     except cv2.error as error:
         raise RecordError(f"a recorded picture cannot be decoded: {error.err}") from error
     if image is None:

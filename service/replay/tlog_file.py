@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from service.errors import RecordError
 from service.replay.footage import Packets
 
 _STX_V1, _STX_V2 = 0xFE, 0xFD
+_STX = re.compile(rb"[\xfd\xfe]")
 _MAX_BYTES = 2 * 1024 * 1024 * 1024
 _FEWEST_US, _MOST_US = 0, 2**62 // 1000
 
@@ -33,7 +35,11 @@ def read_tlog(path: Path) -> list[Packets]:
         at_us = int.from_bytes(data[position : position + 8], "big")
         follows = end == len(data) or (end + 8 < len(data) and data[end + 8] in (_STX_V1, _STX_V2))
         if length is None or end > len(data) or not follows or not _FEWEST_US <= at_us <= _MOST_US:
-            position += 1
+            # On to the next byte that may begin a packet: a foreign file of gigabytes must not take an hour.
+            start = _STX.search(data, position + 9)
+            if start is None:
+                break
+            position = start.start() - 8
             continue
         packets.append(Packets(at_us * 1000, data[position + 8 : end]))
         position = end

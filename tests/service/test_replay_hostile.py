@@ -12,6 +12,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 import zstandard
 from hypothesis import HealthCheck, given, settings
@@ -225,3 +227,11 @@ def test_a_simulated_flight_whose_log_is_damaged_is_refused(tmp_path: Path, data
     log.write_bytes(data)
     with pytest.raises(RecordError, match=words):
         FlownLog(LOGS / "A_hover_and_forward.tlog", [log])
+
+
+def test_a_recorded_picture_that_claims_to_be_huge_is_refused_before_memory_is_taken() -> None:
+    jpeg = bytearray(cv2.imencode(".jpg", np.zeros((48, 64, 3), np.uint8))[1].tobytes())
+    struct.pack_into(">HH", jpeg, jpeg.find(b"\xff\xc0") + 5, 30_000, 30_000)
+    message = b"\x12" + bytes([len(jpeg) & 0x7F | 0x80, len(jpeg) >> 7]) + bytes(jpeg)
+    with pytest.raises(RecordError, match="30000x30000 pixels"):
+        image_of(message)
