@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from importlib.metadata import version
-from typing import Any
 
 import structlog
 
@@ -19,6 +18,8 @@ from service.recorder import messages
 from service.recorder.byte_queue import ByteQueue
 from service.recorder.perception_note import PerceptionNote
 from service.recorder.record_writer import MAX_SENDERS, RecordHeader, RecordWriter
+from service.recorder.recorded_configuration import recorded_configuration
+from service.recorder.recorder_status import RecorderStatus
 from service.recorder.shelf import Shelf, Take
 from service.recorder.tlog_writer import TlogWriter
 from service.settings import Settings
@@ -34,31 +35,6 @@ _RETRY_NS = 5_000_000_000
 _JOIN_S = 5.0
 _ITEM_BYTES = 200
 """What an item costs besides its data."""
-_RECORDED_SECTIONS = ("vehicle", "camera", "mount", "model", "scan", "motion", "scale", "autopilot")
-"""What decides what a picture becomes. Never `[zenoh]`: it may hold a password."""
-
-
-@dataclass(frozen=True)
-class RecorderStatus:
-    """The recorder at one moment.
-
-    Args:
-        recording: a file is open and takes what comes.
-        path: the newest file, or None.
-        pictures, packets: written since the start.
-        dropped_pictures, dropped_packets: not written, because the disk was too slow or full.
-        bytes: written since the start.
-        problem: what is wrong, fit to show a user; empty if nothing.
-    """
-
-    recording: bool = False
-    path: str | None = None
-    pictures: int = 0
-    packets: int = 0
-    dropped_pictures: int = 0
-    dropped_packets: int = 0
-    bytes: int = 0
-    problem: str = ""
 
 
 @dataclass(frozen=True)
@@ -80,17 +56,6 @@ class _Packets:
 class _Status:
     text: bytes
     at_ns: int
-
-
-def recorded_configuration(settings: Settings) -> dict[str, Any]:
-    """The sections that a replay needs, without passwords and key files."""
-    from service.cameras.rtsp import without_password
-
-    dumped = settings.model_dump(mode="json")
-    kept = {name: dumped[name] for name in _RECORDED_SECTIONS if name in dumped}
-    kept["camera"]["source"] = without_password(settings.camera.source)
-    kept["autopilot"].pop("signing_key_file", None)
-    return kept
 
 
 class Recorder:
