@@ -230,11 +230,19 @@ class AutopilotLink:
         for frame in frames:
             transport.send(frame, destination)
         if self._tap is not None:
-            for data, source in arrived:
-                self._tap(data, arrival_ns, False, source)
-            for frame in frames:
-                self._tap(frame, now_ns, True, destination)
+            passed = [(data, arrival_ns, False, source) for data, source in arrived]
+            passed += [(frame, now_ns, True, destination) for frame in frames]
+            self._record(self._tap, passed)
         self._tell()
+
+    def _record(self, tap: Tap, passed: list[tuple[bytes, int, bool, Hashable]]) -> None:
+        try:
+            for data, at_ns, outgoing, whose in passed:
+                tap(data, at_ns, outgoing, whose)
+        except Exception:
+            # The record is a help; the line is the vehicle's protection.
+            log.exception("the line is no longer recorded")
+            self._tap = None
 
     def _tell(self) -> None:
         with self._lock:

@@ -315,6 +315,25 @@ def test_a_fault_of_the_service_itself_does_not_end_the_link(monkeypatch: pytest
     ] * 2
 
 
+def test_a_recorder_that_breaks_does_not_break_the_line() -> None:
+    heard: list[bool] = []
+
+    def broken(data: bytes, at_ns: int, outgoing: bool, whose: Hashable) -> None:
+        heard.append(outgoing)
+        raise RuntimeError("no more room")
+
+    link = AutopilotLink(AutopilotSettings(endpoint="udp:127.0.0.1:0"), MonotonicClock(), broken)
+    link.start()
+    try:
+        assert link.listen_port
+        with udp_peer(link.listen_port) as peer:
+            holds_a_conversation(link, peer)
+    finally:
+        link.close()
+    assert heard == [False] or heard == [True]
+    assert link.status().line_losses == 0
+
+
 def test_a_peer_that_reads_nothing_does_not_hold_up_the_sender(server: socket.socket) -> None:
     """The line fills up; scans are refused rather than queued, every call returns, the line is given up."""
     server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
