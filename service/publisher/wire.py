@@ -29,8 +29,14 @@ _MAX_SIDE = 16_384
 _MAX_AGE_MS = 1e9
 _MAX_DISTANCE_M = 10_000.0
 
-Words = Annotated[str, AfterValidator(lambda text: text[:_MAX_WORDS])]
-"""Text for people: cut at both ends of the way, so that none is refused and none floods a viewer."""
+
+def _shown(text: str) -> str:
+    return "".join(letter if letter.isprintable() else " " for letter in text[:_MAX_WORDS])
+
+
+Words = Annotated[str, AfterValidator(_shown)]
+"""Text for people: cut at both ends of the way, so that none is refused, none floods a viewer, and none tells
+a terminal what to do."""
 
 Nanoseconds = Annotated[int, Field(ge=-(2**63), lt=2**63)]
 Count = Annotated[int, Field(ge=0, lt=2**63)]

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import re
 import threading
 from dataclasses import dataclass, field
 
 from service.freshness import ArrivalClock, Freshness
 from service.publisher import keys
 from service.publisher.wire import ScanSample, StatusSample, WireError
+from service.settings.vehicle import VEHICLE_NAME_PATTERN
 
+_NAME = re.compile(VEHICLE_NAME_PATTERN)
+_MAX_NAME = 64
 _MAX_VEHICLES = 200
 """A peer that invents names must not fill the memory."""
 
@@ -106,6 +110,8 @@ class Board:
     def _entry(self, vehicle: str) -> _Vehicle:
         entry = self._vehicles.get(vehicle)
         if entry is None:
+            if len(vehicle) > _MAX_NAME or not _NAME.fullmatch(vehicle):
+                raise WireError(f"{vehicle[:40]!r} is no name of a vehicle")
             if len(self._vehicles) >= _MAX_VEHICLES:
                 raise WireError(f"more than {_MAX_VEHICLES} vehicles: {vehicle[:40]!r} is left out")
             entry = self._vehicles[vehicle] = _Vehicle()

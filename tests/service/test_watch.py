@@ -173,6 +173,21 @@ def test_invented_vehicles_do_not_fill_the_memory() -> None:
     assert board.bad_samples == 800
 
 
+def test_nothing_from_the_network_tells_the_terminal_what_to_do() -> None:
+    board = Board()
+    status = json.loads(status_bytes()) | {
+        "trouble": "\x1b[2J\x9b2Jcleared",
+        "camera_detail": "\x1b]0;title\x07",
+    }
+    board.hear("uavdepth/kite/status", json.dumps(status).encode(), 0)
+    board.hear("uavdepth/\x1b[2Jhawk/status", status_bytes(), 0)
+    board.hear_alive("uavdepth/\x1b[2Jowl/alive", True)
+    text = text_of(board, 0)
+    assert "cleared" in text
+    assert not {"\x1b", "\x9b", "\x07"} & set(text)
+    assert [view.name for view in board.vehicles(0)] == ["kite"]
+
+
 def test_markup_from_the_network_is_shown_as_text() -> None:
     board = Board()
     board.hear(
