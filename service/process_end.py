@@ -7,17 +7,18 @@ import sys
 import threading
 from typing import NoReturn
 
-STUCK_PREFIX = "zenoh-"
-"""Threads that close sessions; where a peer accepts and stays silent that takes Zenoh many seconds."""
+_STUCK = ("zenoh-", "camera", "side ", "perception", "recorder")
+"""Beginnings of the names of threads that wait inside libraries: a Zenoh session whose peer accepts and stays
+silent takes many seconds to close, as do a camera, a world to be rendered, a network and a disk that hang."""
 
 
 def end_process(code: int) -> NoReturn:
-    """End with `code`, at once where a thread is still inside Zenoh.
+    """End with `code`, at once where such a thread is still there.
 
-    A thread that comes back from there into an interpreter that is being taken down aborts the process:
-    "FATAL: exception not rethrown", exit code 134.
+    One that comes back from its library into an interpreter that is being taken down aborts the process
+    ("FATAL: exception not rethrown", "terminate called without an active exception", exit code 134).
     """
-    if any(thread.name.startswith(STUCK_PREFIX) for thread in threading.enumerate()):
+    if any(thread.name.startswith(_STUCK) for thread in threading.enumerate()):
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)

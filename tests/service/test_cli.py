@@ -279,8 +279,10 @@ def test_run_ends_cleanly_when_told_to(tmp_path: Path, number: signal.Signals) -
 # -- watch
 
 
-@pytest.mark.parametrize(("thread", "taken_down"), [("zenoh-scan", False), ("camera", True)])
-def test_an_interpreter_is_not_taken_down_under_a_thread_that_is_inside_zenoh(
+@pytest.mark.parametrize(
+    ("thread", "taken_down"), [("zenoh-scan", False), ("camera", False), ("no business of ours", True)]
+)
+def test_an_interpreter_is_not_taken_down_under_a_thread_that_is_inside_a_library(
     thread: str, taken_down: bool
 ) -> None:
     program = (
