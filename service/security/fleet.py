@@ -113,9 +113,14 @@ class FleetFolder:
         """A new authority, and everything signed by it.
 
         Raises:
-            SecurityError: a folder that is not empty, unless `force`, or cannot be written.
+            SecurityError: a folder that is not empty, unless it holds a fleet and `force` is given, or that
+                cannot be written.
         """
-        if self._path.exists() and (not self._path.is_dir() or any(self._path.iterdir())) and not force:
+        is_taken = self._path.exists() and (not self._path.is_dir() or any(self._path.iterdir()))
+        if is_taken and not (self._path / _AUTHORITY / _FLEET).is_file():
+            # Folders named like members would be deleted, whatever is in them.
+            raise SecurityError(f"{self._path} is not empty and holds no fleet: choose another folder")
+        if is_taken and not force:
             raise SecurityError(
                 f"{self._path} is not empty: a new authority makes every certificate in it worthless; "
                 "`uavdepth keys add` adds members, --force replaces it"

@@ -65,6 +65,15 @@ def test_nothing_is_overwritten_without_force(folder: Path) -> None:
     assert (folder / "ca" / "ca.key").read_bytes() != before[folder / "ca" / "ca.key"]
 
 
+def test_force_replaces_a_fleet_and_no_other_folder(tmp_path: Path) -> None:
+    (tmp_path / "kite").mkdir()
+    (tmp_path / "kite" / "diary.txt").write_text("not yours")
+    members = (Member("kite", "vehicle", ("10.0.0.1",)),)
+    with pytest.raises(SecurityError, match="holds no fleet"):
+        FleetFolder(tmp_path, members, 10, passwords=True, target=None).make(force=True)
+    assert (tmp_path / "kite" / "diary.txt").exists()
+
+
 def test_members_can_be_added_and_the_others_keep_their_keys(folder: Path) -> None:
     key = (folder / "kite" / "key.pem").read_bytes()
     known, passwords = read_fleet(folder)
@@ -100,6 +109,7 @@ def test_a_fleet_that_cannot_work_is_refused(tmp_path: Path, words: str, texts: 
 @pytest.mark.parametrize(
     ("role", "text"),
     [
+        ("vehicle", "kite\n"),
         ("vehicle", "a/b"),
         ("vehicle", ""),
         ("vehicle", "ca"),
