@@ -60,9 +60,10 @@ class ObstacleScanner:
       of what makes it clear, or tilted away from the flight level.
 
     Depth d with a relative standard deviation sigma may be as near as d * (1 - sigma_factor * sigma). That is
-    where an obstacle is told, and what a clear pixel must reach the ground or maximum distance with. Whether
-    something is an obstacle is for d itself to say: doubt makes no obstacle of far things, and near things
-    stay obstacles however doubtful.
+    where an obstacle is told, and what a clear pixel must reach the ground or maximum distance with. So a
+    surface beyond maximum distance that may well begin within it is told where it may begin: "unknown" would
+    keep PX4 from moving at all. Whether something is ground or lies in the height band is for d itself to
+    say. What is too doubtful to tell (`LARGEST_SHORTENING`) is unknown when far, and an obstacle when near.
 
     Args:
         camera, mount: the camera and how it sits on the vehicle.
@@ -133,7 +134,8 @@ class ObstacleScanner:
         self._slope_rays = np.ascontiguousarray(rays[:, 1::_SLOPE_ROWS, 4::_SLOPE_COLUMNS]).reshape(3, -1)
         self._sloping = SlopingGround(max_ground_slope_deg, max_distance_m, ground_tolerance)
         self._view = BandView(camera, mount, max_distance_m, below_m, above_m)
-        self._histogram = RangeHistogram(max_distance_m, self._joined_rays.shape[1])
+        farthest_m = max_distance_m / (1 - LARGEST_SHORTENING) if sigma_factor > 0 else max_distance_m
+        self._histogram = RangeHistogram(farthest_m, self._joined_rays.shape[1])
         if min_pixels is None:
             min_pixels = smallest_thing(camera, max_distance_m)
         self._needed = pixels_of_thing(camera, self._histogram.edges_m, min_pixels, self._together)
@@ -178,7 +180,8 @@ class ObstacleScanner:
         rising = self._rising_ground(depth, level, ground)
 
         joined = nearest_of_rows(self._speckles.without(depth), self._together)
-        distance = self._nearest(joined.ravel(), level, (ground, rising), self._told_shortening(shortening))
+        doubt = None if shortening is None else shortening[:: self._together].ravel()  # it is smooth
+        distance = self._nearest(joined.ravel(), level, (ground, rising), doubt)
         clear = self._seen_free(depth.ravel(), level, (ground, rising), shortening)
         state = np.where(clear, SectorState.CLEAR, SectorState.UNKNOWN).astype(np.uint8)
         state[~np.isnan(distance)] = SectorState.OBSTACLE
@@ -192,31 +195,37 @@ class ObstacleScanner:
             )
         return picture
 
-    def _told_shortening(self, shortening: NDArray[np.float32] | None) -> NDArray[np.float32] | None:
-        """(joined pixels,) share of an obstacle's distance to take off, 0 to `LARGEST_SHORTENING`."""
-        if shortening is None:
-            return None
-        joined = shortening[:: self._together].copy()  # doubt is smooth: one row stands for its group
-        joined[~(joined <= LARGEST_SHORTENING)] = LARGEST_SHORTENING  # NaN too
-        return np.maximum(joined, 0.0, out=joined).ravel()
-
     def _nearest(
         self,
         depth: NDArray[np.float32],
         level: NDArray[np.float64],
         ground: _Ground,
-        shortening: NDArray[np.float32] | None,
+        doubt: NDArray[np.float32] | None,
     ) -> NDArray[np.float32]:
         """(72,) distance of the nearest obstacle, NaN for none, from every pixel."""
         self._histogram.clear()
         for start in range(0, depth.size, _CHUNK):
             chunk = slice(start, start + _CHUNK)
             points, range_m = self._level_points(self._joined_rays[:, chunk], depth[chunk], level)
-            obstacle = self._is_obstacle(points, range_m, ground)
+            shortening, reach_m = self._told(None if doubt is None else doubt[chunk])
+            obstacle = self._is_obstacle(points, range_m, ground, reach_m)
             if obstacle.any():
-                doubt = None if shortening is None else shortening[chunk]
-                self._histogram.add(points[0], points[1], range_m, obstacle, doubt)
-        return self._histogram.nearest_m(self._needed, self._line_needed)
+                self._histogram.add(points[0], points[1], range_m, obstacle, shortening)
+        distance = self._histogram.nearest_m(self._needed, self._line_needed)
+        # On the mean of its points it may lie beyond after all; as none of them is clear, it is unknown then.
+        distance[distance >= self.max_distance_m] = np.nan
+        return distance
+
+    def _told(
+        self, doubt: NDArray[np.float32] | None
+    ) -> tuple[NDArray[np.float32] | None, NDArray[np.float32] | None]:
+        """(N,) share of each pixel's distance to take off, and (N,) range within which it is an obstacle."""
+        if doubt is None:
+            return None, None
+        tells = doubt < LARGEST_SHORTENING  # NaN does not
+        shortening = np.where(tells, np.maximum(doubt, 0), np.float32(LARGEST_SHORTENING))
+        reach_m = np.where(tells, self.max_distance_m / (1 - shortening), np.float32(self.max_distance_m))
+        return shortening, reach_m.astype(np.float32)
 
     def _seen_free(
         self,
@@ -255,14 +264,18 @@ class ObstacleScanner:
         return points, range_m
 
     def _is_obstacle(
-        self, points: NDArray[np.float32], range_m: NDArray[np.float32], grounds: _Ground
+        self,
+        points: NDArray[np.float32],
+        range_m: NDArray[np.float32],
+        grounds: _Ground,
+        reach_m: NDArray[np.float32] | None = None,
     ) -> NDArray[np.bool_]:
         (ground, rising), down_m = grounds, points[2]
         deepest = self.below_m if ground is None else min(self.below_m, ground.deep_m)
         with np.errstate(invalid="ignore"):
             obstacle = down_m >= np.float32(-self.above_m)
             obstacle &= down_m <= np.float32(deepest)
-            obstacle &= range_m < np.float32(self.max_distance_m)
+            obstacle &= range_m < (np.float32(self.max_distance_m) if reach_m is None else reach_m)
             if ground is not None:
                 limit = range_m * np.float32(-ground.slope)
                 limit += np.float32(ground.height_m)

@@ -76,16 +76,25 @@ class TestCaution:
         assert scan.state[element(0)] == OBSTACLE
         assert 1.9 < scan.distance_m[element(0)] < 4.0
 
-    def test_far_and_certain_is_clear_far_and_doubtful_is_unknown(self, camera, mount, level):
+    @pytest.mark.parametrize("sigma", [0.05, 0.3])
+    def test_far_and_certain_is_clear(self, camera, mount, level, sigma):
+        scan = ObstacleScanner(camera, mount).scan(*self.far_wall(camera, mount, level, sigma))
+        assert scan.state[element(0)] == CLEAR  # 30 m, and 21 m at the least
+
+    def test_far_but_perhaps_within_reach_is_told_where_it_may_begin(self, camera, mount, level):
+        scan = ObstacleScanner(camera, mount).scan(*self.far_wall(camera, mount, level, 0.4))
+        assert scan.state[element(0)] == OBSTACLE
+        assert scan.distance_m[element(0)] == pytest.approx(18.0, rel=0.03)
+
+    @pytest.mark.parametrize("sigma", [0.5, 1.0, 3.0, np.inf, np.nan])
+    def test_far_and_too_doubtful_to_tell_is_unknown(self, camera, mount, level, sigma):
+        scan = ObstacleScanner(camera, mount).scan(*self.far_wall(camera, mount, level, sigma))
+        assert scan.state[element(0)] == UNKNOWN
+
+    @staticmethod
+    def far_wall(camera, mount, level, sigma):
         depth = depth_of([wall(30)], camera, mount, level)
-        scanner = ObstacleScanner(camera, mount)
-        states = {
-            sigma: scanner.scan(depth, level, None, np.full(depth.shape, sigma)).state[element(0)]
-            for sigma in (0.05, 0.3, 0.4, 1.0, 3.0, np.nan)
-        }
-        assert states.pop(0.05) == CLEAR
-        assert states.pop(0.3) == CLEAR  # 21 m
-        assert set(states.values()) == {UNKNOWN}
+        return depth, level, None, np.full(depth.shape, sigma, np.float32)
 
     def test_doubtful_ground_is_not_clear_and_no_obstacle(self, camera, level):
         mount = CameraMount(pitch_deg=-15)
