@@ -11,8 +11,8 @@ from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
 from uavdepth.hints import PointHints
 
-TRAINING_MEDIAN_DEPTH_M = 10.0
-"""Median depth nearer than 80 m of 480 of the training frames of the network that ships, 120 of each scene,
+TRAINING_MEDIAN_DEPTH_M = 12.1
+"""Median depth nearer than 80 m of 480 of the training frames of the network that ships, 80 of each scene,
 weighted as training draws them (`training.data.batches.SCENE_SHARES`)."""
 
 

@@ -103,7 +103,9 @@ def look(
     camera, mount = SETTINGS.camera.model, SETTINGS.mount.mount
     image: NDArray[np.uint8] = street.render(camera, mount, vehicle.position_ned_m, attitude).image_bgr
     stamp_ns = round(controller.now_s * 1e9)
-    telemetry = Telemetry(stamp_ns, attitude, height_m=-vehicle.down_m)
+    telemetry = Telemetry(
+        stamp_ns, attitude, -vehicle.down_m, vehicle.position_ned_m, vehicle.velocity_ned_mps, armed=True
+    )
     result = perception.step(Frame(image, stamp_ns, index), telemetry)
     return encode_obstacle_distance(result.scan).pack(sender) if result.trusted else None
 
@@ -112,7 +114,7 @@ def look(
 class TestAStreetThatNoTrainingSaw:
     @pytest.mark.parametrize("flavor", ["ardupilot", "px4"])
     def test_the_vehicle_stops_before_the_facade(self, flavor: Flavor, street: Scene) -> None:
-        flown = fly(flavor, street, 20.0)
+        flown = fly(flavor, street, 24.0)
         facade_m = float(street.ray_distance_m((0.0, 0.0, -HEIGHT_M), (1.0, 0.0, 0.0))[0])
         assert not flown.controller.collided
         assert max(flown.norths_m) > 12.0, "it must have flown"
