@@ -36,6 +36,14 @@ def set_up_logging(settings: LogSettings) -> None:
     )
 
 
+def log_to_standard_error() -> None:
+    """Keep standard output for a command's result; the form of log lines stays as it is."""
+    # Looked up at each line: who redirects standard error later gets what is logged later.
+    structlog.configure(
+        logger_factory=lambda *_arguments: structlog.PrintLogger(sys.stderr), cache_logger_on_first_use=False
+    )
+
+
 def _exception_in_words(
     logger: object, name: str, event: structlog.typing.EventDict
 ) -> structlog.typing.EventDict:

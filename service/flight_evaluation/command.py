@@ -61,7 +61,9 @@ def evaluate_flight(
     from service.flight_evaluation.sight import DepthKind
     from service.flight_evaluation.tables import print_report
     from service.flight_evaluation.worlds import DEFAULT_SCENES, KNOWN_SCENES
+    from service.log_setup import log_to_standard_error
 
+    log_to_standard_error()
     names = DEFAULT_SCENES if scenes is None else tuple(name.strip() for name in scenes.split(","))
     for name in names:
         if name not in KNOWN_SCENES:

@@ -1,0 +1,29 @@
+"""Logging: standard output belongs to a command's result."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+import structlog
+
+from service.log_setup import log_to_standard_error
+
+
+@pytest.fixture(autouse=True)
+def as_before() -> Iterator[None]:
+    """Logging is the whole process's: what a test changes is put back."""
+    before = structlog.get_config()
+    yield
+    structlog.configure(**before)
+
+
+def test_what_is_logged_does_not_stand_in_a_result(capsys: pytest.CaptureFixture[str]) -> None:
+    structlog.get_logger().info("first")
+    log_to_standard_error()
+    structlog.get_logger().info("second", number=2)
+    printed = capsys.readouterr()
+    assert "first" in printed.out
+    assert "second" not in printed.out
+    assert "second" in printed.err
+    assert "number" in printed.err
