@@ -12,8 +12,9 @@ from service.log_setup import log_to_standard_error
 
 @pytest.fixture(autouse=True)
 def as_before() -> Iterator[None]:
-    """Logging is the whole process's: what a test changes is put back."""
+    """Logging is the whole process's: each test begins anew, and puts back what was."""
     before = structlog.get_config()
+    structlog.reset_defaults()
     yield
     structlog.configure(**before)
 
