@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import threading
+from contextlib import ExitStack
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
-import zenoh
 from numpy.typing import NDArray
 
 from service.clock import Clock
 from service.publisher import keys
+from service.publisher.picture_receiver import PictureReceiver
+from service.publisher.session import Role, open_session
 from service.publisher.wire import DepthHeader, ScanSample, StatusSample, WireError
-from service.watch.board import Board
+from service.watch.board import Board, VehicleView
 from service.watch.listener import Listener
 from uavdepth.depth_codec import decode_depth_png
 from uavdepth.errors import DepthCodecError
@@ -34,10 +36,11 @@ class Pictures:
     header: DepthHeader
 
 
-class GroundObserver(Listener):
-    """Listens to scans and status as `uavdepth watch` does, and to one vehicle's pictures as well.
+class GroundObserver:
+    """Listens to scans and status as `uavdepth watch` does, and to one vehicle's pictures as the ground page.
 
-    Pictures are decoded when they are looked at, not when they come.
+    Pictures come over a session of their own, and what arrives is reported, so that the vehicle fits them to
+    the link. They are decoded when they are looked at, not when they come.
 
     Args:
         vehicle: the vehicle's name.
@@ -45,38 +48,45 @@ class GroundObserver(Listener):
         clock: ages the samples.
 
     Raises:
-        PublisherError: the session cannot be opened.
+        PublisherError: a session that cannot be opened.
     """
 
     def __init__(self, vehicle: str, connect: str, clock: Clock) -> None:
         self.board = Board()
         self._vehicle = vehicle
-        self._own_clock = clock
+        self._clock = clock
         self._lock = threading.Lock()
-        self._samples = 0
+        self._pictures = 0
         self._jpeg: bytes | None = None
         self._depth: tuple[bytes, bytes] | None = None
-        super().__init__([connect], self.board, clock)
-        for topic in (keys.CAMERA, keys.DEPTH):
-            self._session.declare_subscriber(keys.key(vehicle, topic), self._take_picture)
+        with ExitStack() as stack:
+            stack.enter_context(Listener([connect], self.board, clock))
+            session = stack.enter_context(open_session((), (connect,), None, Role.STATION))
+            stack.callback(PictureReceiver(session, vehicle, self._take_picture, clock).close)
+            self._sessions = stack.pop_all()
+
+    def close(self) -> None:
+        """Close the sessions."""
+        self._sessions.close()
 
     @property
     def samples(self) -> int:
-        """Samples received so far, on all keys."""
+        """Scans and pictures received so far."""
+        view = self._view()
         with self._lock:
-            return self._samples
+            return self._pictures + (0 if view is None else view.scans)
 
     @property
     def scan(self) -> ScanSample | None:
         """The newest scan, unless it is too old to show."""
-        views = [view for view in self.board.vehicles(self._own_clock.now_ns()) if view.name == self._vehicle]
-        return views[0].scan if views else None
+        view = self._view()
+        return None if view is None else view.scan
 
     @property
     def status(self) -> StatusSample | None:
         """The newest status, unless it is too old to show."""
-        views = [view for view in self.board.vehicles(self._own_clock.now_ns()) if view.name == self._vehicle]
-        return views[0].status if views else None
+        view = self._view()
+        return None if view is None else view.status
 
     def pictures(self) -> Pictures | None:
         """The newest camera and depth pictures, or None before both have come and where one is broken."""
@@ -94,15 +104,14 @@ class GroundObserver(Listener):
             return None
         return Pictures(np.asarray(image, np.uint8), depth_m, header)
 
-    def _hear(self, sample: zenoh.Sample) -> None:
-        with self._lock:
-            self._samples += 1
-        super()._hear(sample)
+    def _view(self) -> VehicleView | None:
+        views = self.board.vehicles(self._clock.now_ns())
+        return next((view for view in views if view.name == self._vehicle), None)
 
-    def _take_picture(self, sample: zenoh.Sample) -> None:
+    def _take_picture(self, key: str, payload: bytes, attachment: bytes | None) -> None:
         with self._lock:
-            self._samples += 1
-            if str(sample.key_expr).endswith(keys.CAMERA):
-                self._jpeg = sample.payload.to_bytes()
-            elif sample.attachment is not None:
-                self._depth = sample.payload.to_bytes(), sample.attachment.to_bytes()
+            self._pictures += 1
+            if key.endswith(keys.CAMERA):
+                self._jpeg = payload
+            elif attachment is not None:
+                self._depth = payload, attachment

@@ -32,7 +32,7 @@ class DemoReport:
         stop_distance_m: nearest obstacle ahead in the last scan, or None.
         true_distance_m: nearest surface ahead within the same bearings and height band, from the
             scene's geometry, or None.
-        zenoh_samples: samples received over Zenoh, all keys.
+        zenoh_samples: scans and pictures received over Zenoh.
         flown_s: seconds from take-off command to the end.
         reason: why the flight ended.
     """

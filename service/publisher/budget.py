@@ -1,9 +1,10 @@
 """How many bytes of pictures a second the link takes: found from what the ground reports as received.
 
 Slow growth and quick retreat on delay, as congestion controls do it that must leave room for others (LEDBAT,
-RFC 6817). A queue is one that stands: the shortest of several delays tells it from a busy processor (CoDel,
-RFC 8289). Below the rate that was too much last, growth waits for a while (CUBIC, RFC 9438). The delay is
-measured on the vehicle's clock alone.
+RFC 6817); quick growth until pictures have waited for the first time (slow start, RFC 5681). A queue is one
+that stands: the shortest of several delays tells it from a busy processor (CoDel, RFC 8289). Below the rate
+that was too much last, growth waits for a while (CUBIC, RFC 9438). The delay is measured on the vehicle's
+clock alone.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Final
 from service.publisher.received import ReceivedReport
 
 START_BYTES_PER_S: Final = 60_000.0
-"""Until the first report: half of a link of 1 Mbit/s."""
+"""Until the first report: half of a link of 1 Mbit/s. What a faster one takes is found within seconds."""
 
 _MIN_BYTES_PER_S: Final = 4_000.0
 _UNREPORTED_NS: Final = 2_000_000_000
@@ -30,8 +31,15 @@ are to be 150 ms late at most."""
 _LOW_NS: Final = 40_000_000
 """Waiting below which the budget grows."""
 
+_FIRST_GROWTH: Final = 0.3
+"""With each report, before pictures have ever waited."""
+
+_FIRST_PROOF: Final = 2.0
+"""The budget grows so fast only up to this many times what has arrived: small pictures prove nothing about
+large ones (RFC 7661)."""
+
 _GROWTH: Final = 0.06
-"""With each report."""
+"""With each report after that."""
 
 _CAREFUL_GROWTH: Final = 0.004
 _PROBING: Final = 0.02
@@ -71,6 +79,7 @@ class PictureBudget:
         self.delay_ms: float | None = None
         """From publishing to the report of it, by the newest report."""
         self._too_much: float | None = None
+        self._has_waited = False
         self._sent: OrderedDict[tuple[str, int], int] = OrderedDict()
         self._first_sent_ns: int | None = None
         self._last_sent_ns: int | None = None
@@ -117,22 +126,24 @@ class PictureBudget:
         self._last_report_ns = now_ns
         while self._flying and self._flying[0][0] <= sent_ns:
             self._flying_bytes -= self._flying.popleft()[1]
+        arrived = 1e3 * report.size_bytes / max(report.interval_ms, 100.0)
         delay_ns = max(0, now_ns - sent_ns - round(report.age_ms * 1e6))
         self.delay_ms = delay_ns / 1e6
         waits.append(delay_ns - self._base_ns(delay_ns, now_ns))
+        self._has_waited |= len(waits) == _STANDING and min(waits) >= _LOW_NS
         if _stands(waits):
             waits.clear()
-            arrived = 1e3 * report.size_bytes / max(report.interval_ms, 100.0)
             self._too_much = min(self.bytes_per_s, max(arrived, _DEEPEST * self.bytes_per_s))
             self._shrunk_ns = now_ns
             self._set(_RETREAT * self._too_much)
         elif waits[-1] < _LOW_NS and wants_more:
             # Each of several stations reports: together they must not grow faster than one.
-            self._set(self.bytes_per_s * (1 + self._growth(now_ns) / len(self._stations)))
+            self._set(self.bytes_per_s * (1 + self._growth(arrived, now_ns) / len(self._stations)))
 
-    def _growth(self, now_ns: int) -> float:
+    def _growth(self, arrived_bytes_per_s: float, now_ns: int) -> float:
         if self._too_much is None or self._shrunk_ns is None:
-            return _GROWTH
+            proven = _FIRST_PROOF * arrived_bytes_per_s / self.bytes_per_s - 1
+            return _GROWTH if self._has_waited else min(max(proven, _GROWTH), _FIRST_GROWTH)
         if not _NEAR * self._too_much < self.bytes_per_s < _FAR * self._too_much:
             return _GROWTH
         is_early = now_ns - self._shrunk_ns <= _CAREFUL_NS

@@ -9,7 +9,7 @@ FRAME_S: Final = 0.05
 """Largest picture in seconds of the budget: scans wait behind it, and Zenoh may drop what takes longer."""
 
 _MARGIN = 0.8
-_UP_NS: Final = 1_000_000_000
+_UP_NS: Final = 500_000_000
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def camera_ladder(quality: int) -> tuple[Step, ...]:
 
 
 class Ladder:
-    """Chooses the rung on which pictures fit; goes down at once, and up when it has been quiet for a second.
+    """Chooses the rung on which pictures fit; goes down at once, and up after half a second of quiet.
 
     Args:
         steps: best first.
@@ -85,6 +85,6 @@ class Ladder:
             self._index = max(self._index + 1, fitting)
             self._changed_ns = now_ns
         elif fitting < self._index and now_ns - self._changed_ns >= _UP_NS:
-            self._index -= 1
+            self._index = fitting
             self._changed_ns = now_ns
         return fits

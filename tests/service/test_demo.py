@@ -25,6 +25,7 @@ from service.demo.radar import CLEAR_BGR, OBSTACLE_BGR, draw_radar
 from service.demo.report import DemoReport, Latency
 from service.demo.truth import true_distance_ahead_m
 from service.publisher import keys
+from service.publisher.received import ReceivedReport
 from service.publisher.session import open_session
 from service.publisher.wire import CameraHeader, DepthHeader, Intrinsics, ScanSample
 from service.settings.load import load_settings
@@ -157,11 +158,15 @@ class TestObserver:
         depth = DepthHeader(**stamp, near_m=0.5, far_m=60.0, camera=Intrinsics.of(camera))  # type: ignore[arg-type]
         picture = CameraHeader(**stamp, camera=Intrinsics.of(camera))  # type: ignore[arg-type]
         jpeg = cv2.imencode(".jpg", np.full((32, 64, 3), 90, np.uint8))[1].tobytes()
+        reports: list[bytes] = []
         with open_session((endpoint,), ()) as session:
+            session.declare_subscriber(
+                keys.key("demo", keys.RECEIVED), lambda sample: reports.append(sample.payload.to_bytes())
+            )
             observer = GroundObserver("demo", endpoint, MonotonicClock())
             try:
                 until_s = time.monotonic() + 20.0
-                while observer.pictures() is None or observer.scan is None:
+                while observer.pictures() is None or observer.scan is None or not reports:
                     session.put(keys.key("demo", keys.SCAN), scan.encode())
                     session.put(
                         keys.key("demo", keys.DEPTH),
@@ -174,6 +179,7 @@ class TestObserver:
                 seen = observer.pictures()
                 assert seen is not None
                 assert observer.samples >= 3
+                assert ReceivedReport.decode(reports[0]).topic in (keys.DEPTH, keys.CAMERA)
                 np.testing.assert_allclose(seen.depth_m, 7.0, rtol=0.02)
                 assert seen.image_bgr.shape == (32, 64, 3)
             finally:

@@ -95,11 +95,23 @@ def test_a_slow_link_is_filled_well_and_never_for_long(kbit_per_s: float) -> Non
     assert sum(radio.arrived) / 60.0 > 0.25 * radio.bytes_per_s
 
 
-def test_a_fast_link_gets_full_pictures_in_spite_of_a_busy_processor() -> None:
-    radio = Radio(10e6, limit=2e6, jitter_ms=30)
-    radio.run(60.0)
+@pytest.mark.parametrize(("jitter_ms", "seconds"), [(0, 4.0), (30, 8.0)])
+def test_a_fast_link_gets_full_pictures_in_seconds_on_a_busy_processor_too(
+    jitter_ms: int, seconds: float
+) -> None:
+    radio = Radio(10e6, limit=2e6, jitter_ms=jitter_ms)
+    radio.run(seconds)
     assert radio.ladders["depth"].is_at_top
     assert radio.ladders["camera"].is_at_top
+
+
+@pytest.mark.parametrize("kbit_per_s", [1000, 2000])
+def test_the_first_viewer_on_a_slow_link_does_not_wait_for_what_a_fast_one_would_take(
+    kbit_per_s: float,
+) -> None:
+    radio = Radio(kbit_per_s * 125.0)
+    radio.run(10.0)
+    assert max(radio.delays_ms) < 500.0
 
 
 def test_a_link_that_gets_slower_is_noticed_within_seconds() -> None:
