@@ -15,6 +15,7 @@ from uavdepth.camera import CameraModel, CameraMount
 from uavdepth.errors import ImageSizeError, ScanError
 from uavdepth.joined_rows import mean_of_rows, nearest_of_rows, rows_together
 from uavdepth.level_ground import GROUND_DEPTH_SHARE, LevelGround, find_level_ground
+from uavdepth.level_points import level_points, near_heights
 from uavdepth.obstacle_scan import ObstacleScan, SectorState, sector_bearings_deg
 from uavdepth.range_histogram import RangeHistogram
 from uavdepth.required_pixels import pixels_of_line, pixels_of_thing, smallest_thing
@@ -206,8 +207,12 @@ class ObstacleScanner:
         self._histogram.clear()
         for start in range(0, depth.size, _CHUNK):
             chunk = slice(start, start + _CHUNK)
-            points, range_m = self._level_points(self._joined_rays[:, chunk], depth[chunk], level)
-            shortening, reach_m = self._told(None if doubt is None else doubt[chunk])
+            rays, chunk_depth = self._joined_rays[:, chunk], depth[chunk]
+            near = near_heights(
+                rays, chunk_depth, level, self.mount.position_body_m, -self.above_m, self.below_m
+            )
+            points, range_m = self._level_points(rays.take(near, axis=1), chunk_depth[near], level)
+            shortening, reach_m = self._told(None if doubt is None else doubt[chunk][near])
             obstacle = self._is_obstacle(points, range_m, ground, reach_m)
             if obstacle.any():
                 self._histogram.add(points[0], points[1], range_m, obstacle, shortening)
@@ -251,17 +256,7 @@ class ObstacleScanner:
     def _level_points(
         self, rays: NDArray[np.float32], depth: NDArray[np.float32], level: NDArray[np.float64]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """(3, N) points in the level frame from the vehicle's origin, and (N,) their horizontal distance."""
-        points = np.matmul(level.astype(np.float32), rays)
-        with np.errstate(invalid="ignore", over="ignore"):
-            points *= depth
-            origin = level @ self.mount.position_body_m
-            if origin.any():
-                points += origin.astype(np.float32)[:, None]
-            range_m = points[0] * points[0]
-            range_m += points[1] * points[1]
-            np.sqrt(range_m, out=range_m)
-        return points, range_m
+        return level_points(rays, depth, level, self.mount.position_body_m)
 
     def _is_obstacle(
         self,
