@@ -249,7 +249,8 @@ class ObstacleScanner:
             # NaN fails: no claim is not a small claim.
             doubt = shortening.ravel()[probe.pixel]
             certain = (doubt >= 0) & (doubt < 1)
-            points, range_m = self._level_points(rays, probed * (1 - doubt), level)
+            share = np.where(certain, 1 - doubt, np.float32(1))  # nothing at no distance is no number
+            points, range_m = self._level_points(rays, probed * share, level)
             free &= certain & ~self._is_obstacle(points, range_m, ground)
         return seen_sectors(free, probe.cell, FREE_SHARE)
 

@@ -33,8 +33,8 @@ class LinkStatus:
         obstacle_delay_ms: half and 19 of 20 scans left within so many milliseconds of their capture; None
             before the first.
         transport_ms: how long a message is under way to the autopilot, learnt; milliseconds.
-        not_made_good: scans that left as they were at capture, at least in part, because attitude or
-            velocity was not known.
+        not_made_good: scans whose turn or way since capture was not known; without attitude nothing in
+            them was clear.
         byte_budget_per_s: bytes a second that the line may carry; 0 for no limit.
         dropped_messages: messages that found no room on the line before they were too old.
         refused_obstacles: scans that were not sent, by reason.

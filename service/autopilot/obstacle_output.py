@@ -119,7 +119,7 @@ class ObstacleOutput:
 
     @property
     def not_made_good(self) -> int:
-        """Scans that were told as they were at capture, at least in part."""
+        """Scans whose turn or way since capture was not known."""
         return self._delivery.not_made_good
 
     @property

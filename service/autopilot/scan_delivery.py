@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+
+import numpy as np
 
 from service.autopilot.telemetry_tracker import TelemetryTracker
 from service.autopilot.transport_delay import TransportDelay
 from uavdepth.attitude import Attitude
-from uavdepth.obstacle_scan import ObstacleScan
+from uavdepth.obstacle_scan import ObstacleScan, SectorState
 from uavdepth.scan_motion import PlanarPose, moved_scan
 
 _NO_TURN_RAD = math.radians(0.5)
@@ -32,7 +35,7 @@ class ScanDelivery:
         self._tracker = tracker
         self._transport = transport
         self.not_made_good = 0
-        """Scans told as they were at capture, at least in part: attitude or velocity was not known."""
+        """Scans whose turn or way since capture was not known. Without attitude nothing stays clear."""
 
     def attitude(self, captured_ns: int, now_ns: int) -> Attitude | None:
         """Attitude when a message that leaves now is read; where that is not known, at capture."""
@@ -40,12 +43,16 @@ class ScanDelivery:
         return self._tracker.telemetry_at(captured_ns).attitude if there is None else there
 
     def scan(self, scan: ObstacleScan, captured_ns: int, now_ns: int) -> ObstacleScan:
-        """`scan`, captured at `captured_ns`, for a message that leaves now."""
+        """`scan`, captured at `captured_ns`, for a message that leaves now.
+
+        Where the turn since then is not known, no direction is clear any more. Obstacles stay where they
+        were seen: the best warning that there is.
+        """
         read_ns = now_ns + self._transport.estimate_ns
         here, there = self._tracker.telemetry_at(captured_ns), self._tracker.predicted(read_ns)
         if here.attitude is None or there.attitude is None:
             self.not_made_good += 1
-            return scan
+            return _without_clear(scan)
         north_m = east_m = 0.0
         if there.velocity_ned_mps is None:
             self.not_made_good += 1
@@ -66,3 +73,8 @@ class ScanDelivery:
         if turned_rad == 0.0 and way_m == (0.0, 0.0):
             return scan
         return moved_scan(scan, turned_rad, way_m)
+
+
+def _without_clear(scan: ObstacleScan) -> ObstacleScan:
+    state = np.where(scan.state == SectorState.CLEAR, SectorState.UNKNOWN, scan.state)
+    return replace(scan, state=state.astype(np.uint8))

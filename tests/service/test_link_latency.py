@@ -148,8 +148,11 @@ def test_r9_without_the_turn_made_good_the_same_bearing_would_be_18_degrees_off(
     flight.fly(3.0)
     flight.silent = True
     flight.fly(0.5)
-    assert told_at(flight.tell(pole(0.0, 8.0), age_ms=200)) == [0.0]
+    message = flight.tell(pole(0.0, 8.0), age_ms=200)
+    assert told_at(message) == [0.0]
     assert flight.talk.session.status(flight.talk.now_ns).not_made_good == 1
+    # Who does not know how far it has turned knows of no direction that it is free.
+    assert set(message.distances) == {800, 65535}
 
 
 def test_what_is_ahead_is_told_nearer_by_the_way_flown_since_the_picture() -> None:
