@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 import structlog
@@ -23,6 +24,8 @@ _SAMPLE_NS = 40_000_000
 _LONGEST_LOOK_BACK_NS = 500_000_000
 _FEWEST_POINTS = 10
 """Fewer may all lie on one thing that moves."""
+
+Result = TypeVar("Result")
 
 
 class LiveHints:
@@ -60,19 +63,32 @@ class LiveHints:
             frame: the picture, not older than the one before; an older one begins anew.
             telemetry_at: the vehicle at a time; an answer for another time is not listened to.
         """
+        points = self._guarded(lambda following: self._followed(following, frame, telemetry_at))
+        return points if points is not None and len(points) else None
+
+    def measure(self) -> None:
+        """What can wait until a picture's distances have been sent; `update` does what was not done."""
+        self._guarded(MotionPoints.measure)
+
+    def _guarded(self, work: Callable[[MotionPoints], Result]) -> Result | None:
         if self._points is None:
             return None
         try:
-            self._hear(frame.captured_ns, telemetry_at)
-            points = self._points.update(frame.image_bgr, frame.captured_ns, self._motion)
+            return work(self._points)
         except Exception:
             # Points are a help: without them the height still tells metres, or nothing does and that is said.
             if not self._complained:
                 self._complained = True
-                log.exception("measuring points by motion failed", frame=frame.index)
+                log.exception("measuring points by motion failed")
             self.clear()
             return None
-        return points if len(points) else None
+
+    def _followed(
+        self, points: MotionPoints, frame: Frame, telemetry_at: Callable[[int], Telemetry]
+    ) -> PointHints:
+        points.measure()
+        self._hear(frame.captured_ns, telemetry_at)
+        return points.update(frame.image_bgr, frame.captured_ns, self._motion)
 
     def _hear(self, captured_ns: int, telemetry_at: Callable[[int], Telemetry]) -> None:
         """Add what became known of the motion since the last picture."""

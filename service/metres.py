@@ -82,6 +82,11 @@ class Metres:
             return self._told_metres(frame, telemetry_at)
         return self._found_metres(frame, telemetry_at, self._found)
 
+    def look_ahead(self) -> None:
+        """What of one picture only the next ones need; `measure` begins with it where nobody called."""
+        if self._points is not None:
+            self._points.measure()
+
     def without_hints(self, frame: Frame) -> DepthMap:
         """What the network says of a picture alone, in units of its own."""
         if self._found is None:

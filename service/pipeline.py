@@ -165,6 +165,13 @@ class Perception:
             self._memory.clear()
         return result
 
+    def look_ahead(self) -> None:
+        """What of one picture only the next ones need; to be called when its result has been sent.
+
+        Results are the same without it: the next step begins with what was left undone.
+        """
+        self._metres.look_ahead()
+
     def remark(self, result: PerceptionResult) -> str | None:
         """What seems to be configured wrong; to be called when a result has been sent.
 

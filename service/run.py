@@ -84,7 +84,8 @@ class Service:
                 settings.camera.source, settings.camera, self._clock, self._link, settings.mount.mount
             )
         self._reader = CameraReader(camera, self._frames)
-        self._sides = SideCameras(settings, self._clock, self._link)
+        record = None if self._recorder is None else self._recorder.offer
+        self._sides = SideCameras(settings, self._clock, self._link, record=record)
         self._publisher: ZenohPublisher | None = None
         if settings.zenoh.enabled:
             self._publisher = ZenohPublisher(
@@ -262,6 +263,7 @@ class Service:
         if self._recorder is not None:
             self._recorder.offer(result, begun_ns, done_ns)
         self._hand_out(result)
+        perception.look_ahead()
         remark = perception.remark(result)
         if remark is not None:
             self._link.say(SEVERITY_WARNING, remark)

@@ -71,6 +71,10 @@ class MotionPointSettings:
 class MotionPoints:
     """Follows corners from picture to picture and measures their depth by the way the vehicle went.
 
+    Measuring takes the most time, and can wait until a picture's distances have been sent: the points of a
+    picture are those measured up to the one before it, carried along with the vehicle to where their corners
+    are seen now.
+
     Nothing comes of a hover but points that were measured before; of flight along the optical axis
     nothing near the point it heads for. Objects that move are told by residuals across their epipolar
     lines; one that moves along them (a car ahead on one's own course) is not told from a thing that
@@ -95,6 +99,7 @@ class MotionPoints:
         self._carried = CarriedPoints(camera, self.settings.carry_s)
         self._turns = TurnCheck()
         self._last = _no_points()
+        self._unmeasured: VehicleMotion | None = None
 
     @property
     def suspicion(self) -> str | None:
@@ -107,6 +112,7 @@ class MotionPoints:
         self._times.clear()
         self._carried.clear()
         self._last = _no_points()
+        self._unmeasured = None
 
     def update(self, image_bgr: NDArray[np.uint8], captured_ns: int, motion: VehicleMotion) -> PointHints:
         """Points of one picture.
@@ -128,10 +134,11 @@ class MotionPoints:
             raise ImageSizeError(
                 f"the picture is {image_bgr.shape} {image_bgr.dtype}, the camera's is {shape} uint8"
             )
+        if self._times and captured_ns == self._times[-1]:
+            return self._last
+        self.measure()
         if self._times:
             gap_ns = captured_ns - self._times[-1]
-            if gap_ns == 0:
-                return self._last
             if gap_ns < 0:
                 self.clear()
             elif gap_ns > _LONGEST_GAP_NS:
@@ -140,6 +147,16 @@ class MotionPoints:
         self._follow(image_bgr, captured_ns, motion)
         self._last = self._points(captured_ns, motion)
         return self._last
+
+    def measure(self) -> None:
+        """Measure the newest picture's points, for the pictures after it; `update` does what was not done."""
+        motion, self._unmeasured = self._unmeasured, None
+        if motion is None:
+            return
+        captured_ns = self._times[-1]
+        views = self._views(captured_ns, motion)
+        if views and len(self._tracks.ids):
+            self._measure(captured_ns, motion, views)
 
     def _follow(self, image_bgr: NDArray[np.uint8], captured_ns: int, motion: VehicleMotion) -> None:
         small = cv2.resize(image_bgr, self._size, interpolation=cv2.INTER_AREA)
@@ -157,11 +174,9 @@ class MotionPoints:
     def _points(self, captured_ns: int, motion: VehicleMotion) -> PointHints:
         if not motion.knows(captured_ns):
             return _no_points()
+        self._unmeasured = motion
         ids, pixels = self._tracks.ids, self._pixels(self._tracks.positions[-1])
         self._carried.move(captured_ns, motion, self.mount)
-        views = self._views(captured_ns, motion)
-        if views and len(ids):
-            self._measure(captured_ns, motion, views)
         return self._carried.hints(ids, pixels, captured_ns, self.settings.largest_carried_sigma)
 
     def _views(self, captured_ns: int, motion: VehicleMotion) -> list[tuple[int, CameraMotion]]:

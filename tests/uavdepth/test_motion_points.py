@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 import pytest
 from moving_camera import LEVEL, Place, straight, told, wall_picture
+from numpy.typing import NDArray
 
 from uavdepth import CameraModel, CameraMount, ImageSizeError, PointHints
 from uavdepth.motion_points import MotionPoints, MotionPointSettings
@@ -62,6 +63,22 @@ def test_a_wall_is_where_it_is(velocity: tuple[float, float, float]) -> None:
     assert np.median(np.abs(last.depth_m / depth - 1)) < 0.03
     # The corners err by less than is assumed, so this is the safe side.
     assert np.mean(np.abs(last.depth_m / depth - 1) < last.relative_sigma) > 0.68
+
+
+def test_points_are_the_same_whenever_they_are_measured() -> None:
+    class Early(MotionPoints):
+        """Measures as soon as a picture's points have been told."""
+
+        def update(self, image_bgr: NDArray[np.uint8], captured_ns: int, motion: VehicleMotion) -> PointHints:
+            points = super().update(image_bgr, captured_ns, motion)
+            self.measure()
+            return points
+
+    late = fly(MotionPoints(CAMERA, CameraMount()), SIDEWAYS, tenths(0, 5))[-1]
+    early = fly(Early(CAMERA, CameraMount()), SIDEWAYS, tenths(0, 5))[-1]
+    assert len(late) > 60
+    np.testing.assert_array_equal(early.depth_m, late.depth_m)
+    np.testing.assert_array_equal(early.relative_sigma, late.relative_sigma)
 
 
 def test_points_spread_over_the_picture() -> None:
