@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import os
 import socket
 import threading
 import time
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import count
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +34,9 @@ LEVEL = Attitude(0.0, 0.0, 0.0)
 FLYING_HEIGHT_M = 2.0
 WAIT_S = 20.0
 """Far longer than anything takes: a test that reaches it has failed."""
+
+_PORTS = (20_000 + (509 * os.getpid() + number) % 12_000 for number in count())
+"""Below those that systems hand out by themselves; of each process of tests its own few hundred."""
 
 
 def make_settings(*overrides: str) -> Settings:
@@ -61,11 +67,12 @@ def wait_until(holds: Callable[[], bool]) -> None:
 
 
 def free_port() -> int:
-    """A TCP port of the loopback that nobody uses now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
+    """A TCP port of the loopback that nobody uses now, nor takes before it is used."""
+    while True:
+        port = next(_PORTS)
+        with socket.socket() as probe, suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
 
 
 def wall_over_ground(
