@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from uavdepth.errors import ScanError
 from uavdepth.obstacle_scan import ObstacleScan, SectorState
-from uavdepth.scan_motion import PlanarPose, moved_scan
+from uavdepth.scan_motion import PlanarPose, moved_scans
 
 LONGEST_MEMORY_S = 0.5
 """PX4 forgets a bin after as long; what is older is not evidence in a world that moves."""
@@ -87,7 +88,7 @@ class ScanMemory:
         self._forget(scan, at_ns, pose)
         distance, state = scan.distance_m.copy(), scan.state.copy()
         if self._kept:
-            carried = [_carried(kept, pose) for kept in reversed(self._kept)]
+            carried = _carried(list(reversed(self._kept)), pose)
             _fill_unknown(distance, state, carried)
             if len(carried) >= _FRAMES_IN_A_ROW:
                 _bridge(scan, distance, state, carried[:_FRAMES_IN_A_ROW])
@@ -124,13 +125,16 @@ def _is_finite(pose: PlanarPose) -> bool:
     return all(math.isfinite(value) for value in (pose.north_m, pose.east_m, pose.yaw_rad))
 
 
-def _carried(kept: _Remembered, pose: PlanarPose) -> ObstacleScan:
-    turned, way = kept.pose.motion_to(pose)
-    moved = moved_scan(kept.scan, turned, way)
-    with np.errstate(invalid="ignore"):
-        passed = moved.distance_m <= _PASSED_M
-    state = np.where(passed, SectorState.UNKNOWN, moved.state).astype(np.uint8)
-    return replace(moved, state=state, distance_m=np.where(passed, np.float32(np.nan), moved.distance_m))
+def _carried(kept: Sequence[_Remembered], pose: PlanarPose) -> list[ObstacleScan]:
+    turned, ways = zip(*(one.pose.motion_to(pose) for one in kept), strict=True)
+    carried = []
+    for moved in moved_scans([one.scan for one in kept], turned, ways):
+        with np.errstate(invalid="ignore"):
+            passed = moved.distance_m <= _PASSED_M
+        state = np.where(passed, np.uint8(SectorState.UNKNOWN), moved.state)
+        distance = np.where(passed, np.float32(np.nan), moved.distance_m)
+        carried.append(replace(moved, state=state, distance_m=distance))
+    return carried
 
 
 def _fill_unknown(
