@@ -60,7 +60,7 @@ class ByteQueue(Generic[T]):
             return self._closed and not self._items
 
     @property
-    def waiting_bytes(self) -> int:
-        """Bytes that wait."""
+    def oldest(self) -> T | None:
+        """The item that is taken next, or None."""
         with self._condition:
-            return self._bytes
+            return self._items[0][0] if self._items else None

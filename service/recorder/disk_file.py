@@ -59,14 +59,6 @@ class DiskFile:
             self.error = self.error or error
             raise
 
-    def sync(self) -> None:
-        """Wait until the disk has everything, so that a power cut takes no more than a crash."""
-        try:
-            self._file.flush()
-            os.fsync(self._file.fileno())
-        except OSError as error:
-            self.error = self.error or error
-
     def close(self) -> None:
         """Close; may be called twice. An error is remembered."""
         try:

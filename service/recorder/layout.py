@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-FORMAT = 1
-"""Version of the layout; readers refuse others by name."""
+FORMAT = 2
+"""Version of the layout: 2 has further cameras and the uncertainty of depth. Newer ones are refused."""
+
+OLDEST_FORMAT = 1
+"""The oldest that is read."""
 
 PROFILE = ""
 """MCAP profile: none, the topics carry well-known Foxglove schemas."""
 
-CAMERA_TOPIC = "/camera/image"
-CALIBRATION_TOPIC = "/camera/calibration"
-DEPTH_TOPIC = "/camera/depth"
+IMAGE, CALIBRATION, DEPTH, SIGMA, NOTE = "image", "calibration", "depth", "depth_sigma", "perception"
+"""What there is of each camera; see `camera_topic`."""
+
 SCAN_TOPIC = "/scan"
 POINTS_TOPIC = "/scan/points"
 POSE_TOPIC = "/vehicle/pose"
 FRAMES_TOPIC = "/tf"
-PERCEPTION_TOPIC = "/perception"
 STATUS_TOPIC = "/status"
 MAVLINK_IN_TOPIC = "/mavlink/in"
 """Bytes as they arrived, one message an arrival; further senders on a UDP port have `/mavlink/in/2`, ..."""
@@ -38,5 +40,26 @@ CHUNK_BYTES = 256 * 1024
 LOCAL_FRAME = "local"
 LEVEL_FRAME = "level"
 BODY_FRAME = "body"
-CAMERA_FRAME = "camera"
-"""Frames of the viewers: x forward (or east), y left (or north), z up; the camera's is OpenCV's."""
+"""Frames of the viewers: x forward (or east), y left (or north), z up; those of cameras are OpenCV's."""
+
+
+def camera_topic(what: str, camera: str = "") -> str:
+    """Topic of one camera: `/camera/image`, `/perception`; of a further one `/camera/NAME/...`."""
+    if not camera and what == NOTE:
+        return f"/{NOTE}"
+    return f"/camera/{camera}/{what}" if camera else f"/camera/{what}"
+
+
+def camera_of(topic: str) -> tuple[str, str] | None:
+    """What of which camera lies in `topic` (the main one's name is ""); None for other topics."""
+    parts = topic.split("/")
+    if parts == ["", NOTE]:
+        return NOTE, ""
+    if parts[:2] != ["", "camera"] or len(parts) not in (3, 4):
+        return None
+    return parts[-1], parts[2] if len(parts) == 4 else ""
+
+
+def camera_frame(camera: str = "") -> str:
+    """The viewers' frame of a camera."""
+    return f"camera_{camera}" if camera else "camera"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import cv2
 import numpy as np
@@ -25,7 +27,8 @@ from foxglove.messages import (
 from numpy.typing import NDArray
 
 from service.errors import RecordError
-from service.recorder.layout import BODY_FRAME, CAMERA_FRAME, LEVEL_FRAME, LOCAL_FRAME
+from service.recorder.layout import BODY_FRAME, LEVEL_FRAME, LOCAL_FRAME, camera_frame
+from service.recorder.sigma_codes import sigma_codes
 from service.telemetry import Telemetry
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
@@ -44,7 +47,9 @@ def timestamp(wall_ns: int) -> Timestamp:
     return Timestamp(wall_ns // 1_000_000_000, wall_ns % 1_000_000_000)
 
 
-def compressed_image(image_bgr: NDArray[np.uint8], quality: int, wall_ns: int) -> CompressedImage:
+def compressed_image(
+    image_bgr: NDArray[np.uint8], quality: int, wall_ns: int, camera: str = ""
+) -> CompressedImage:
     """The picture as JPEG.
 
     Raises:
@@ -54,33 +59,42 @@ def compressed_image(image_bgr: NDArray[np.uint8], quality: int, wall_ns: int) -
     if not written:
         raise RecordError(f"a picture of shape {image_bgr.shape} cannot be written as JPEG")
     return CompressedImage(
-        timestamp=timestamp(wall_ns), frame_id=CAMERA_FRAME, data=data.tobytes(), format="jpeg"
+        timestamp=timestamp(wall_ns), frame_id=camera_frame(camera), data=data.tobytes(), format="jpeg"
     )
 
 
-def depth_image(depth_m: NDArray[np.float32], wall_ns: int) -> RawImage:
+def depth_image(depth_m: NDArray[np.float32], wall_ns: int, camera: str = "") -> RawImage:
     """Depth as 16UC1 in whole millimetres, rounded down; 0 where it is unknown or beyond 65.535 m."""
     millimetres = np.floor(depth_m.astype(np.float64) * 1000.0)
     known = (millimetres >= 1) & (millimetres <= _FARTHEST_MM)  # NaN and infinity compare false
     packed = np.where(known, millimetres, 0).astype("<u2")
-    height, width = packed.shape
+    return _raw_image(packed, "16UC1", wall_ns, camera)
+
+
+def sigma_image(relative_sigma: NDArray[np.float32], wall_ns: int, camera: str = "") -> RawImage:
+    """The uncertainty of depth as 8UC1 in the codes of `sigma_codes`."""
+    return _raw_image(sigma_codes(relative_sigma), "8UC1", wall_ns, camera)
+
+
+def _raw_image(pixels: NDArray[Any], encoding: str, wall_ns: int, camera: str) -> RawImage:
+    height, width = pixels.shape
     return RawImage(
         timestamp=timestamp(wall_ns),
-        frame_id=CAMERA_FRAME,
+        frame_id=camera_frame(camera),
         width=width,
         height=height,
-        encoding="16UC1",
-        step=2 * width,
-        data=packed.tobytes(),
+        encoding=encoding,
+        step=pixels.itemsize * width,
+        data=pixels.tobytes(),
     )
 
 
-def calibration(camera: CameraModel, wall_ns: int) -> CameraCalibration:
-    """The camera's intrinsics and distortion."""
+def calibration(camera: CameraModel, wall_ns: int, name: str = "") -> CameraCalibration:
+    """The intrinsics and distortion of the camera `name`."""
     k = camera.matrix
     return CameraCalibration(
         timestamp=timestamp(wall_ns),
-        frame_id=CAMERA_FRAME,
+        frame_id=camera_frame(name),
         width=camera.width,
         height=camera.height,
         distortion_model="rational_polynomial" if len(camera.distortion) > 5 else "plumb_bob",
@@ -132,14 +146,19 @@ def vehicle_pose(telemetry: Telemetry, wall_ns: int) -> PoseInFrame | None:
     )
 
 
-def frame_transforms(telemetry: Telemetry, mount: CameraMount, wall_ns: int) -> FrameTransforms:
-    """Local to level (heading), level to body (roll, pitch), body to camera (mount)."""
+def frame_transforms(
+    telemetry: Telemetry, mounts: Mapping[str, CameraMount], wall_ns: int
+) -> FrameTransforms:
+    """Local to level (heading), level to body (roll, pitch), body to each camera (mounts by name)."""
     attitude = telemetry.attitude or Attitude(0.0, 0.0, 0.0)
     heading = Attitude(0.0, 0.0, attitude.yaw_rad).ned_from_body
     steps = (
         (LOCAL_FRAME, LEVEL_FRAME, _place(telemetry), _ENU_FROM_NED @ heading @ _FLIP),
         (LEVEL_FRAME, BODY_FRAME, np.zeros(3), _FLIP @ attitude.level_from_body @ _FLIP),
-        (BODY_FRAME, CAMERA_FRAME, _FLIP @ mount.position_body_m, _FLIP @ mount.body_from_camera),
+        *(
+            (BODY_FRAME, camera_frame(name), _FLIP @ mount.position_body_m, _FLIP @ mount.body_from_camera)
+            for name, mount in mounts.items()
+        ),
     )
     return FrameTransforms(
         transforms=[

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,22 +12,19 @@ from typing import Any
 import foxglove
 from foxglove import Channel, Context, Schema
 from foxglove.channels import (
-    CameraCalibrationChannel,
-    CompressedImageChannel,
     FrameTransformsChannel,
     LaserScanChannel,
     PointCloudChannel,
     PoseInFrameChannel,
-    RawImageChannel,
 )
 from foxglove.mcap import MCAPCompression, MCAPWriteOptions
 from foxglove.messages import CompressedImage, RawImage
 
 from service.errors import RecordError
 from service.recorder import layout, messages
+from service.recorder.camera_channels import CameraChannels, RecordedCamera
 from service.recorder.disk_file import DiskFile
 from service.recorder.perception_note import PerceptionNote
-from uavdepth.camera import CameraModel, CameraMount
 
 # A full disk is told by the recorder, once, in its own words.
 logging.getLogger("foxglove").setLevel(logging.CRITICAL)
@@ -35,7 +32,6 @@ logging.getLogger("foxglove").setLevel(logging.CRITICAL)
 _COMPRESSION_LEVEL = 1
 MAX_SENDERS = 8
 """Senders on one line whose bytes are kept apart."""
-_NOTE_SCHEMA = json.dumps({"title": "uavdepth.Perception", **PerceptionNote.model_json_schema()}).encode()
 
 
 @dataclass(frozen=True)
@@ -76,29 +72,23 @@ class RecordWriter:
     Args:
         path: the new file; nothing is overwritten.
         header: what it begins with.
-        camera, mount: whose pictures these are.
+        cameras: whose pictures these are, the main one among them.
 
     Raises:
         OSError: the file exists or cannot be made.
         RecordError: as below.
     """
 
-    def __init__(self, path: Path, header: RecordHeader, camera: CameraModel, mount: CameraMount) -> None:
+    def __init__(self, path: Path, header: RecordHeader, cameras: Sequence[RecordedCamera]) -> None:
         self._file = DiskFile(path)
         self._offset_ns = header.wall_offset_ns
-        self._camera, self._mount = camera, mount
+        self._mounts = {camera.name: camera.mount for camera in cameras}
         self._context = context = Context()
-        self._image = CompressedImageChannel(layout.CAMERA_TOPIC, context=context)
-        self._calibration = CameraCalibrationChannel(layout.CALIBRATION_TOPIC, context=context)
-        self._depth = RawImageChannel(layout.DEPTH_TOPIC, context=context)
+        self._cameras = {camera.name: CameraChannels(camera, context) for camera in cameras}
         self._scan = LaserScanChannel(layout.SCAN_TOPIC, context=context)
         self._points = PointCloudChannel(layout.POINTS_TOPIC, context=context)
         self._pose = PoseInFrameChannel(layout.POSE_TOPIC, context=context)
         self._frames = FrameTransformsChannel(layout.FRAMES_TOPIC, context=context)
-        note_schema = Schema(name="uavdepth.Perception", encoding="jsonschema", data=_NOTE_SCHEMA)
-        self._notes = Channel(
-            layout.PERCEPTION_TOPIC, message_encoding="json", schema=note_schema, context=context
-        )
         self._status = Channel(layout.STATUS_TOPIC, message_encoding="json", context=context)
         self._packets: dict[str, Channel] = {}
         try:
@@ -139,13 +129,20 @@ class RecordWriter:
         """Add a JSON document."""
         self._writer.attach(log_time=0, create_time=0, name=name, media_type="application/json", data=data)
 
-    def note(self, note: PerceptionNote) -> None:
-        """Write what became of a picture, and draw it for the viewers. Comes before the picture itself."""
+    def note(self, note: PerceptionNote, camera: str = "") -> None:
+        """Write what became of a picture; it comes before the picture itself.
+
+        Of the main camera, whose scan holds what all of them see, it is drawn for the viewers too.
+        """
         wall_ns = note.captured_ns + self._offset_ns
-        self._notes.log(note.encode(), log_time=wall_ns)
-        self._calibration.log(messages.calibration(self._camera, wall_ns), log_time=wall_ns)
+        self._cameras[camera].note(note, wall_ns)
+        if not camera:
+            self._draw(note, wall_ns)
+        self._check()
+
+    def _draw(self, note: PerceptionNote, wall_ns: int) -> None:
         telemetry = note.telemetry.telemetry(note.captured_ns)
-        transforms = messages.frame_transforms(telemetry, self._mount, wall_ns)
+        transforms = messages.frame_transforms(telemetry, self._mounts, wall_ns)
         self._frames.log(transforms, log_time=wall_ns)
         pose = messages.vehicle_pose(telemetry, wall_ns)
         if pose is not None:
@@ -154,16 +151,20 @@ class RecordWriter:
             scan = note.scan.scan()
             self._scan.log(messages.laser_scan(scan, wall_ns), log_time=wall_ns)
             self._points.log(messages.scan_points(scan, wall_ns), log_time=wall_ns)
-        self._check()
 
-    def image(self, image: CompressedImage, captured_ns: int) -> None:
+    def image(self, image: CompressedImage, captured_ns: int, camera: str = "") -> None:
         """Write the picture of the note before."""
-        self._image.log(image, log_time=captured_ns + self._offset_ns)
+        self._cameras[camera].image(image, captured_ns + self._offset_ns)
         self._check()
 
-    def depth(self, depth: RawImage, captured_ns: int) -> None:
+    def depth(self, depth: RawImage, captured_ns: int, camera: str = "") -> None:
         """Write the depth of the note before."""
-        self._depth.log(depth, log_time=captured_ns + self._offset_ns)
+        self._cameras[camera].depth(depth, captured_ns + self._offset_ns)
+        self._check()
+
+    def sigma(self, sigma: RawImage, captured_ns: int, camera: str = "") -> None:
+        """Write the uncertainty of the depth before."""
+        self._cameras[camera].sigma(sigma, captured_ns + self._offset_ns)
         self._check()
 
     def packets(self, data: bytes, at_ns: int, *, outgoing: bool, sender: int = 0) -> None:
@@ -193,8 +194,8 @@ class RecordWriter:
         self._status.log(text, log_time=at_ns + self._offset_ns)
         self._check()
 
-    def flush(self, *, sync: bool = False) -> None:
-        """End the chunk and hand it to the system, with `sync` to the disk.
+    def flush(self) -> None:
+        """End the chunk and hand it to the system.
 
         Raises:
             RecordError: that failed.
@@ -203,8 +204,6 @@ class RecordWriter:
             self._writer.flush()
         except RuntimeError as error:
             raise self._failure(error) from error
-        if sync:
-            self._file.sync()
         self._check()
 
     def close(self, summary: Mapping[str, str] | None = None) -> None:

@@ -6,7 +6,17 @@ from typing import Any
 
 from service.settings import Settings
 
-_RECORDED_SECTIONS = ("vehicle", "camera", "mount", "model", "scan", "motion", "scale", "autopilot")
+_RECORDED_SECTIONS = (
+    "vehicle",
+    "camera",
+    "extra_camera",
+    "mount",
+    "model",
+    "scan",
+    "motion",
+    "scale",
+    "autopilot",
+)
 """What decides what a picture becomes. Never `[zenoh]`: it may hold a password."""
 
 
@@ -16,6 +26,7 @@ def recorded_configuration(settings: Settings) -> dict[str, Any]:
 
     dumped = settings.model_dump(mode="json")
     kept = {name: dumped[name] for name in _RECORDED_SECTIONS if name in dumped}
-    kept["camera"]["source"] = without_password(settings.camera.source)
+    for one in (kept, *kept["extra_camera"]):
+        one["camera"]["source"] = without_password(one["camera"]["source"])
     kept["autopilot"].pop("signing_key_file", None)
     return kept

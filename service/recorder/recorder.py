@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
 from importlib.metadata import version
 
 import structlog
@@ -13,15 +12,14 @@ import structlog
 from service.clock import Clock
 from service.errors import RecordError
 from service.perception_result import PerceptionResult
-from service.publisher.rate_limit import RateLimit
-from service.recorder import messages
 from service.recorder.byte_queue import ByteQueue
-from service.recorder.perception_note import PerceptionNote
-from service.recorder.record_writer import MAX_SENDERS, RecordHeader, RecordWriter
+from service.recorder.disk_sync import DiskSync
+from service.recorder.items import Item, PacketsItem, PictureItem, StatusItem
+from service.recorder.part import Part
+from service.recorder.record_writer import RecordHeader, RecordWriter
 from service.recorder.recorded_configuration import recorded_configuration
 from service.recorder.recorder_status import RecorderStatus
 from service.recorder.shelf import Shelf, Take
-from service.recorder.tlog_writer import TlogWriter
 from service.settings import Settings
 from service.thread_rank import stand_back
 
@@ -29,33 +27,15 @@ log = structlog.get_logger()
 
 _MIB = 1024 * 1024
 _TAKE_S = 0.1
-_FLUSH_NS = 1_000_000_000
-"""What a crash may cost."""
+_FLUSH_NS = 400_000_000
+"""What a crash may cost, with the time of writing and with what waits: a second together."""
+_CARE_NS = 1_000_000_000
+"""How often the disk is asked to keep what the system has, and is looked at."""
+_BEHIND_NS = 1_000_000_000
+"""What waits longer is told."""
 _RETRY_NS = 5_000_000_000
 _JOIN_S = 5.0
-_ITEM_BYTES = 200
-"""What an item costs besides its data."""
-
-
-@dataclass(frozen=True)
-class _Picture:
-    result: PerceptionResult
-    begun_ns: int
-    done_ns: int
-
-
-@dataclass(frozen=True)
-class _Packets:
-    data: bytes
-    at_ns: int
-    outgoing: bool
-    source: Hashable
-
-
-@dataclass(frozen=True)
-class _Status:
-    text: bytes
-    at_ns: int
+_SYNC_S = 0.5
 
 
 class Recorder:
@@ -86,15 +66,13 @@ class Recorder:
         self._open_writer = open_writer
         self._wall_offset_ns = wall_ns() - clock.now_ns()
         self._shelf = Shelf(settings.record, settings.vehicle.name)
-        self._queue: ByteQueue[_Picture | _Packets | _Status] = ByteQueue(settings.record.queue_mib * _MIB)
+        self._queue: ByteQueue[Item] = ByteQueue(settings.record.queue_mib * _MIB)
         self._take: Take | None = None
-        self._part = 0
-        self._writer: RecordWriter | None = None
-        self._tlog: TlogWriter | None = None
+        self._number = 0
+        self._part: Part | None = None
         self._senders: dict[Hashable, int] = {}
-        depth_hz = settings.record.depth_rate_hz
-        self._depth_limit = RateLimit(depth_hz) if depth_hz > 0 else None
-        self._flush_due_ns = 0
+        self._sync = DiskSync()
+        self._flush_due_ns = self._care_due_ns = 0
         self._retry_due_ns = 0
         self._problem = ""
         self._newest: str | None = None
@@ -112,37 +90,38 @@ class Recorder:
         """
         self._shelf.make()
         self._take = self._shelf.new_take(self._clock.now_ns() + self._wall_offset_ns)
+        self._sync.start()
         self._thread.start()
 
-    def offer(self, result: PerceptionResult, begun_ns: int, done_ns: int) -> None:
-        """Record a picture and what became of it; see `PerceptionNote`."""
-        size = result.frame.image_bgr.nbytes + _ITEM_BYTES
-        if result.depth is not None:
-            size += result.depth.depth_m.nbytes
-        if not self._queue.put(_Picture(result, begun_ns, done_ns), size, large=True):
-            self._drop_picture()
+    def offer(self, result: PerceptionResult, begun_ns: int, done_ns: int, camera: str = "") -> None:
+        """Record a picture and what became of it; see `PictureItem`."""
+        self._put(PictureItem(result, begun_ns, done_ns, camera))
 
     def offer_packets(self, data: bytes, at_ns: int, outgoing: bool, source: Hashable = None) -> None:
         """Record bytes of the MAVLink line."""
-        if not self._queue.put(_Packets(data, at_ns, outgoing, source), len(data) + _ITEM_BYTES):
-            self._drop_packets()
+        self._put(PacketsItem(data, at_ns, outgoing, source))
 
     def offer_status(self, text: bytes) -> None:
         """Record the service's status, as JSON text."""
-        self._queue.put(_Status(text, self._clock.now_ns()), len(text) + _ITEM_BYTES)
+        self._put(StatusItem(text, self._clock.now_ns()))
 
     def status(self) -> RecorderStatus:
         """The recorder now."""
+        oldest = self._queue.oldest
+        behind_ns = 0 if oldest is None else self._clock.now_ns() - oldest.at_ns
         with self._counting:
+            problem = self._problem
+            if not problem and behind_ns > _BEHIND_NS:
+                problem = f"{behind_ns / 1e9:.1f} s behind: disk or processor is slow"
             return RecorderStatus(
-                recording=self._writer is not None and not self._problem,
+                recording=self._part is not None and not self._problem,
                 path=self._newest,
                 pictures=self._pictures,
                 packets=self._packets,
                 dropped_pictures=self._dropped_pictures,
                 dropped_packets=self._dropped_packets,
                 bytes=self._bytes,
-                problem=self._problem,
+                problem=problem,
             )
 
     def stop(self) -> None:
@@ -152,6 +131,11 @@ class Recorder:
             self._thread.join(_JOIN_S)
             if self._thread.is_alive():
                 log.warning("the recorder's disk does not answer; `uavdepth recover` reads what it has")
+        self._sync.stop(_SYNC_S)
+
+    def _put(self, item: Item) -> None:
+        if not self._queue.put(item, item.size_bytes, large=isinstance(item, PictureItem)):
+            self._drop(item)
 
     # -- the thread
 
@@ -169,94 +153,60 @@ class Recorder:
                 # Whatever breaks here, the flight goes on and so does the next file.
                 log.exception("recorder broke")
                 self._fail(f"{type(error).__name__}: {error}")
-            if isinstance(item, _Picture) and not written:
-                self._drop_picture()
-            elif isinstance(item, _Packets) and not written:
-                self._drop_packets()
+            if item is not None and not written:
+                self._drop(item)
         self._close()
 
-    def _write(self, item: _Picture | _Packets | _Status) -> bool:
+    def _write(self, item: Item) -> bool:
         """Write an item; False if there is no file for it now."""
-        writer = self._open_if_due()
-        if writer is None:
+        part = self._open_if_due()
+        if part is None or not part.write(item):
             return False
-        if isinstance(item, _Picture):
-            self._write_picture(writer, item)
-        elif isinstance(item, _Packets):
-            self._write_packets(writer, item)
-        else:
-            writer.status(item.text, item.at_ns)
+        self._pictures += isinstance(item, PictureItem)
+        self._packets += isinstance(item, PacketsItem)
         return True
 
-    def _write_picture(self, writer: RecordWriter, item: _Picture) -> None:
-        result = item.result
-        captured_ns, wall_ns = result.captured_ns, result.captured_ns + self._wall_offset_ns
-        writer.note(PerceptionNote.of(result, item.begun_ns, item.done_ns))
-        if self._record.camera:
-            image = messages.compressed_image(result.frame.image_bgr, self._record.camera_quality, wall_ns)
-            writer.image(image, captured_ns)
-        depth, limit = result.depth, self._depth_limit
-        if depth is not None and limit is not None and limit.allows(captured_ns):
-            writer.depth(messages.depth_image(depth.depth_m, wall_ns), captured_ns)
-        self._pictures += 1
-
-    def _write_packets(self, writer: RecordWriter, item: _Packets) -> None:
-        sender = 0 if item.outgoing else self._sender(item.source)
-        if sender is None:
-            self._drop_packets()
-            return
-        writer.packets(item.data, item.at_ns, outgoing=item.outgoing, sender=sender)
-        if self._tlog is not None:
-            wall_ns = item.at_ns + self._wall_offset_ns
-            self._tlog.write(item.data, wall_ns, outgoing=item.outgoing, sender=sender)
-        self._packets += 1
-
-    def _sender(self, source: Hashable) -> int | None:
-        """A number for each sender on the line; None for those beyond the eighth."""
-        if source not in self._senders and len(self._senders) >= MAX_SENDERS:
-            return None
-        return self._senders.setdefault(source, len(self._senders))
-
-    def _open_if_due(self) -> RecordWriter | None:
-        """The open file, a new part where the old one is full, or None while the disk is not to be had."""
-        if self._writer is not None and self._writer.size > self._record.max_file_mib * _MIB:
+    def _open_if_due(self) -> Part | None:
+        """The open part, the next where it is full, or None while the disk is not to be had."""
+        if self._part is not None and self._part.size > self._record.max_file_mib * _MIB:
             self._close()
-        if self._writer is not None:
-            return self._writer
+        if self._part is not None:
+            return self._part
         now_ns = self._clock.now_ns()
         if now_ns < self._retry_due_ns or self._take is None:
             return None
-        self._shelf.make_room(self._take, self._part)
-        self._part += 1
+        self._shelf.make_room(self._take, self._number)
+        self._number += 1
         header = RecordHeader(
             vehicle=self._settings.vehicle.name,
             version=version("uavdepth"),
             wall_offset_ns=self._wall_offset_ns,
             configuration=recorded_configuration(self._settings),
-            part=self._part,
+            part=self._number,
             model_card=self._model_card(),
         )
-        path = self._take.part(self._part, ".mcap")
-        self._writer = self._open_writer(
-            path, header, self._settings.camera.model, self._settings.mount.mount
-        )
-        if self._record.tlog:
-            self._tlog = TlogWriter(path.with_suffix(".tlog"))
-        self._flush_due_ns = now_ns + _FLUSH_NS
+        path = self._take.part(self._number, ".mcap")
+        self._part = Part(path, header, self._settings, self._senders, self._open_writer)
+        self._flush_due_ns, self._care_due_ns = now_ns + _FLUSH_NS, now_ns + _CARE_NS
         self._newest = str(path)
         log.info("recording", file=str(path))
         self._problem = ""
-        return self._writer
+        return self._part
 
     def _flush_if_due(self) -> None:
         now_ns = self._clock.now_ns()
-        if self._writer is None or self._take is None or now_ns < self._flush_due_ns:
+        if self._part is None or self._take is None or now_ns < self._flush_due_ns:
             return
         self._flush_due_ns = now_ns + _FLUSH_NS
-        self._writer.flush(sync=True)
-        if self._tlog is not None:
-            self._tlog.flush()
-        self._shelf.make_room(self._take, self._part)
+        self._part.flush()
+        if now_ns < self._care_due_ns:
+            return
+        self._care_due_ns = now_ns + _CARE_NS
+        error, self._sync.error = self._sync.error, None
+        if error is not None:
+            raise RecordError(f"record {self._part.path}: {error.strerror or error}")
+        self._sync.ask(self._part.path)
+        self._shelf.make_room(self._take, self._number)
 
     def _fail(self, reason: str) -> None:
         """Leave the file and try again later; say so once."""
@@ -264,18 +214,13 @@ class Recorder:
             log.warning("recording has stopped", problem=reason, tried_again_every_s=_RETRY_NS / 1e9)
         self._problem = reason
         self._retry_due_ns = self._clock.now_ns() + _RETRY_NS
-        was_open = self._writer is not None
         self._close()
-        if was_open and self._take is not None:
-            self._shelf.drop_empty(self._take, self._part)
+        if self._take is not None:
+            self._shelf.drop_empty(self._take, self._number)
 
     def _close(self) -> None:
-        writer, self._writer = self._writer, None
-        tlog, self._tlog = self._tlog, None
-        if tlog is not None:
-            tlog.close()
-            self._bytes += tlog.size
-        if writer is None:
+        part, self._part = self._part, None
+        if part is None:
             return
         summary = {
             "pictures": str(self._pictures),
@@ -284,15 +229,13 @@ class Recorder:
             "dropped_packets": str(self._dropped_packets),
         }
         try:
-            writer.close(summary)
+            part.close(summary)
         except RecordError as error:
             log.warning("a record was not closed; `uavdepth recover` reads it", problem=str(error))
-        self._bytes += writer.size
+        self._bytes += part.total_size
+        self._sync.ask(part.path)
 
-    def _drop_picture(self) -> None:
+    def _drop(self, item: Item) -> None:
         with self._counting:
-            self._dropped_pictures += 1
-
-    def _drop_packets(self) -> None:
-        with self._counting:
-            self._dropped_packets += 1
+            self._dropped_pictures += isinstance(item, PictureItem)
+            self._dropped_packets += isinstance(item, PacketsItem)

@@ -16,6 +16,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from service.autopilot.framing import MESSAGE_IDS
 from service.errors import RecordError
 from service.recorder import messages
+from service.recorder.camera_channels import recorded_cameras
 from service.recorder.perception_note import PerceptionNote, TelemetryNote
 from service.recorder.record_writer import RecordHeader, RecordWriter
 from service.replay.flight_plans import FlightPlan
@@ -109,7 +110,7 @@ def fly_record(plan: FlightPlan, logs: Path, output: Path, *, force: bool = Fals
     output.mkdir(parents=True, exist_ok=True)
     unfinished = output / f".{plan.name}.unfinished"
     unfinished.unlink(missing_ok=True)
-    writer = RecordWriter(unfinished, header, settings.camera.model, settings.mount.mount)
+    writer = RecordWriter(unfinished, header, recorded_cameras(settings))
     try:
         _write(writer, plan, settings, log, scene, ground, packets, (begin_ns, end_ns, zero_ns))
         writer.close()

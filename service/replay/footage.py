@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.recorder.perception_note import PerceptionNote
+from uavdepth.depth_map import DepthMap
 
 
 @dataclass(frozen=True)
@@ -36,12 +37,15 @@ class RecordedPicture:
     Args:
         note: index and times; what it became, where that was recorded.
         image_bgr: (H, W, 3) uint8, or None where the camera was not recorded.
-        depth_m: (H, W) float32 metres, NaN where unknown, or None where depth was not recorded.
+        depth: metres, NaN where unknown, with its uncertainty where that was recorded; or None where depth
+            was not.
+        camera: name of a further camera; "" for the main one.
     """
 
     note: PerceptionNote
     image_bgr: NDArray[np.uint8] | None = None
-    depth_m: NDArray[np.float32] | None = None
+    depth: DepthMap | None = None
+    camera: str = ""
 
 
 class Footage(Protocol):
@@ -60,4 +64,4 @@ class Footage(Protocol):
         """What is wrong and does not keep it from being played."""
 
     def pictures(self) -> Iterator[RecordedPicture]:
-        """The pictures in the order of their capture; may be called again."""
+        """The pictures of each camera in the order of their capture; may be called again."""

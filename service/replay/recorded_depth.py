@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,18 +20,18 @@ class RecordedDepth:
     """Answers with the depth that was recorded; the player lays it in."""
 
     def __init__(self) -> None:
-        self.depth_m: NDArray[np.float32] | None = None
-        """(H, W) metres of the picture that is asked for next."""
+        self.depth: DepthMap | None = None
+        """Of the picture that is asked for next, in metres."""
 
     def infer(
         self, image_bgr: NDArray[np.uint8], camera: CameraModel, hints: Hints | None = None
     ) -> DepthMap:
         """The recorded depth. Raises RecordError if it is not of the camera's size."""
-        depth_m = self.depth_m
-        if depth_m is None or depth_m.shape != (camera.height, camera.width):
-            found = "none" if depth_m is None else f"{depth_m.shape[1]}x{depth_m.shape[0]}"
+        depth = self.depth
+        if depth is None or depth.depth_m.shape != (camera.height, camera.width):
+            found = "none" if depth is None else f"{depth.depth_m.shape[1]}x{depth.depth_m.shape[0]}"
             raise RecordError(f"recorded depth is {found}: {camera.width}x{camera.height} is needed")
-        return DepthMap(depth_m, None)
+        return depth
 
 
 class InMetres:
@@ -49,5 +51,12 @@ class InMetres:
 
 def perception_of_depth(settings: Settings, source: RecordedDepth) -> Perception:
     """The pipeline behind the network: scan, memory and everything after it."""
-    quiet = settings.model_copy(update={"motion": settings.motion.model_copy(update={"points": False})})
+    quiet = settings.model_copy(
+        update={
+            "motion": settings.motion.model_copy(update={"points": False}),
+            # In flight the network's own doubt was held against the limit; the recorded one is larger by that
+            # of the scale, and what was too doubtful is not in recorded depth.
+            "model": settings.model.model_copy(update={"max_relative_sigma": math.inf}),
+        }
+    )
     return Perception(quiet, source, InMetres(), make_scanner(quiet), takes=())

@@ -4,28 +4,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import cv2
-import numpy as np
 from mcap.records import Attachment, Channel, Message, Metadata
-from numpy.typing import NDArray
 
 from service.errors import RecordError
-from service.ground.errors import PictureError
-from service.ground.pictures import check_jpeg
 from service.recorder import layout
 from service.recorder.perception_note import PerceptionNote
 from service.recorder.record_reader import RecordReader
 from service.replay.footage import Packets, RecordedPicture
-from service.replay.protobuf_fields import protobuf_fields
+from service.replay.recorded_images import depth_of, image_of, sigma_of
+from uavdepth.depth_map import DepthMap
 
-_MAX_PIXELS = 4096 * 4096
-_MAX_PICTURE_BYTES = 3 * _MAX_PIXELS
 _MAX_CONFIGURATION_BYTES = 1_000_000
-_IMAGE_DATA = 2
-_RAW_WIDTH, _RAW_HEIGHT, _RAW_ENCODING, _RAW_STEP, _RAW_DATA = 2, 3, 4, 5, 6
 
 
 class Recording:
@@ -48,8 +41,7 @@ class Recording:
         """Sections of the configuration that it was flown with."""
         self.vehicle = ""
         self.picture_count = 0
-        self.image_count = 0
-        self.depth_count = 0
+        """Of the main camera."""
         self.warnings: list[str] = []
         """What is wrong with the files and does not keep them from being played."""
         self._offsets_ns: dict[Path, int] = {}
@@ -91,9 +83,7 @@ class Recording:
                 if offset_ns is None:
                     raise _not_ours(path)
                 topic = topics.get(item.channel_id, "")
-                self.picture_count += topic == layout.PERCEPTION_TOPIC
-                self.image_count += topic == layout.CAMERA_TOPIC
-                self.depth_count += topic == layout.DEPTH_TOPIC
+                self.picture_count += layout.camera_of(topic) == (layout.NOTE, "")
                 at_ns = item.log_time - offset_ns
                 if topic == layout.MAVLINK_OUT_TOPIC:
                     packets.append(Packets(at_ns, item.data, outgoing=True))
@@ -112,12 +102,12 @@ class Recording:
             offset_ns = int(metadata.get("wall_offset_ns", ""))
         except ValueError as error:
             raise RecordError(f"{path}: its metadata {layout.METADATA!r} has no format and offset") from error
-        if version != layout.FORMAT:
+        if not layout.OLDEST_FORMAT <= version <= layout.FORMAT:
             age = "a newer version of uavdepth" if version > layout.FORMAT else "an older version of uavdepth"
             written_by = metadata.get("version", "?")[:40]
             raise RecordError(
                 f"{path}: record format {version}, written by {age} ({written_by}); "
-                f"this one reads format {layout.FORMAT}"
+                f"this one reads formats {layout.OLDEST_FORMAT} to {layout.FORMAT}"
             )
         self.vehicle = metadata.get("vehicle", "")[:64]
         self._offsets_ns[path] = offset_ns
@@ -138,77 +128,49 @@ class Recording:
 
     def _pictures_of(self, path: Path) -> Iterator[RecordedPicture]:
         offset_ns = self._offsets_ns[path]
-        topics: dict[int, str] = {}
-        note: PerceptionNote | None = None
-        image: NDArray[np.uint8] | None = None
-        depth_m: NDArray[np.float32] | None = None
+        topics: dict[int, tuple[str, str] | None] = {}
+        picture: RecordedPicture | None = None
         damaged = 0
         for item in RecordReader(path).items():
             if isinstance(item, Channel):
-                topics[item.id] = item.topic
+                topics[item.id] = layout.camera_of(item.topic)
                 continue
-            if not isinstance(item, Message):
+            topic = topics.get(item.channel_id) if isinstance(item, Message) else None
+            if topic is None or not isinstance(item, Message):
                 continue
-            topic = topics.get(item.channel_id, "")
+            what, camera = topic
             try:
-                if topic == layout.PERCEPTION_TOPIC:
-                    if note is not None:
-                        yield RecordedPicture(note, image, depth_m)
-                    note, image, depth_m = None, None, None
-                    note = PerceptionNote.decode(item.data)
-                elif note is None or item.log_time - offset_ns != note.captured_ns:
-                    continue
-                elif topic == layout.CAMERA_TOPIC:
-                    image = image_of(item.data)
-                elif topic == layout.DEPTH_TOPIC:
-                    depth_m = depth_of(item.data)
+                if what == layout.NOTE:
+                    if picture is not None:
+                        yield picture
+                    picture = None
+                    picture = RecordedPicture(PerceptionNote.decode(item.data), camera=camera)
+                elif (
+                    picture is not None
+                    and camera == picture.camera
+                    and item.log_time - offset_ns == picture.note.captured_ns
+                ):
+                    picture = _with(picture, what, item.data)
             except RecordError as error:
                 damaged += 1
                 if damaged == 1:
                     self.warnings.append(f"{path}: damaged pictures are left out ({error})")
-        if note is not None:
-            yield RecordedPicture(note, image, depth_m)
+        if picture is not None:
+            yield picture
 
 
-def image_of(data: bytes) -> NDArray[np.uint8]:
-    """(H, W, 3) uint8 picture of a `foxglove.CompressedImage`.
-
-    Raises:
-        RecordError: it holds no picture.
-    """
-    jpeg = protobuf_fields(data).get(_IMAGE_DATA)
-    if not isinstance(jpeg, bytes) or not jpeg:
-        raise RecordError("a recorded picture is empty")
-    try:
-        # OpenCV takes 10 s and gigabytes for a few hundred bytes that claim to be huge.
-        check_jpeg(jpeg, _MAX_PICTURE_BYTES)
-        image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
-    except PictureError as error:
-        raise RecordError(f"a recorded picture cannot be decoded: {error}") from error
-    except cv2.error as error:
-        raise RecordError(f"a recorded picture cannot be decoded: {error.err}") from error
-    if image is None:
-        raise RecordError("a recorded picture cannot be decoded")
-    return np.asarray(image, np.uint8)
-
-
-def depth_of(data: bytes) -> NDArray[np.float32]:
-    """(H, W) float32 metres of a `foxglove.RawImage` in 16UC1 millimetres, NaN where it is 0.
-
-    Raises:
-        RecordError: it is no such picture.
-    """
-    fields = protobuf_fields(data)
-    width, height, step = fields.get(_RAW_WIDTH, 0), fields.get(_RAW_HEIGHT, 0), fields.get(_RAW_STEP, 0)
-    encoding, packed = fields.get(_RAW_ENCODING, b""), fields.get(_RAW_DATA, b"")
-    if not (isinstance(width, int) and isinstance(height, int) and isinstance(packed, bytes)):
-        raise RecordError("a recorded depth picture is damaged")
-    if encoding != b"16UC1" or not 0 < width * height <= _MAX_PIXELS or step != 2 * width:
-        raise RecordError(f"a recorded depth picture is {width}x{height} of {encoding!r}: 16UC1 is needed")
-    if len(packed) != step * height:
-        raise RecordError(f"a recorded depth picture has {len(packed)} bytes: {step * height} are needed")
-    millimetres = np.frombuffer(packed, "<u2").reshape(height, width)
-    return np.where(millimetres == 0, np.nan, millimetres / 1000.0).astype(np.float32)
+def _with(picture: RecordedPicture, what: str, data: bytes) -> RecordedPicture:
+    """The picture with one more part of it. Raises RecordError if that is damaged."""
+    if what == layout.IMAGE:
+        return replace(picture, image_bgr=image_of(data))
+    if what == layout.DEPTH:
+        return replace(picture, depth=DepthMap(depth_of(data)))
+    if what == layout.SIGMA and picture.depth is not None:
+        sigma = sigma_of(data)
+        if sigma.shape != picture.depth.depth_m.shape:
+            raise RecordError(f"a recorded uncertainty of shape {sigma.shape} is not of its depth's")
+        return replace(picture, depth=DepthMap(picture.depth.depth_m, sigma))
+    return picture
 
 
 def _not_ours(path: Path) -> RecordError:

@@ -29,17 +29,35 @@ from service.replay.player import Replayed, play
 from service.replay.recorded_settings import settings_of
 from service.replay.recording import Recording
 from service.replay.replayed_link import ReplayedLink
-from service.settings import Settings
+from service.settings import ExtraCameraSettings, Settings
 from service.settings.autopilot import AutopilotSettings
+from uavdepth.depth_map import DepthMap
 from uavdepth.obstacle_scan import SectorState
 
 MS_NS = 1_000_000
 WALL_M = 6.0
+AHEAD = 31
+"""Element along the nose."""
 
 
-def flown(folder: Path, *overrides: str, pictures: int = 8) -> Path:
-    """A record of a vehicle 2 m above ground that looks at a wall 6 m ahead, pictures at 10 Hz."""
+def flown(
+    folder: Path,
+    *overrides: str,
+    pictures: int = 8,
+    sigma: float | None = None,
+    right_m: float | None = None,
+) -> Path:
+    """A record of a vehicle 2 m above ground that looks at a wall 6 m ahead, pictures at 10 Hz.
+
+    Args:
+        sigma: what depth is said to be uncertain by.
+        right_m: a second camera looks to the right at a wall so far away; its measurements end later.
+    """
     settings = record_settings(folder, "record.depth_rate_hz=60", "model.provider=cpu", *overrides)
+    if right_m is not None:
+        looks = {"name": "right", "camera": settings.camera.model_dump(), "mount": {"yaw_deg": 90.0}}
+        right = ExtraCameraSettings.model_validate(looks)
+        settings = settings.model_copy(update={"extra_camera": (right,)})
     clock = ManualClock(100 * SECOND_NS)
     recorder = Recorder(settings, clock, wall_ns=lambda: WALL_NS)
     voice = Voice()
@@ -53,8 +71,14 @@ def flown(folder: Path, *overrides: str, pictures: int = 8) -> Path:
         recorder.offer_packets(voice.position(boot_ms, (0.0, 0.0, -2.0), (0.0, 0.0, 0.0)), now_ns, False)
         if tick >= 20 and tick % 5 == 0 and tick < 20 + 5 * pictures:
             result = result_at((tick - 20) // 5, now_ns, rng)
-            result = replace(result, depth=replace(result.depth, depth_m=depth_m))  # type: ignore[type-var]
+            doubt = None if sigma is None else np.full_like(depth_m, sigma)
+            result = replace(result, depth=DepthMap(depth_m, doubt))
             recorder.offer(result, now_ns + 5 * MS_NS, now_ns + 60 * MS_NS)
+            if right_m is not None:
+                aside = DepthMap(wall_over_ground(settings.camera.model, right_m))
+                recorder.offer(
+                    replace(result, depth=aside), now_ns + 20 * MS_NS, now_ns + 80 * MS_NS, "right"
+                )
         clock.advance_s(0.02)
     recorder.start()
     recorder.stop()
@@ -85,6 +109,11 @@ def test_recorded_depth_gives_the_wall_again_without_the_network(tmp_path: Path)
         assert ahead.any()
         assert one.result.scan.nearest_m == pytest.approx(WALL_M, abs=0.1)
         assert one.result.telemetry.height_m == pytest.approx(2.0)
+
+
+def test_recorded_doubt_shortens_distances_again(tmp_path: Path) -> None:
+    for one in replayed(flown(tmp_path, sigma=0.2)):
+        assert one.result.scan.nearest_m == pytest.approx(WALL_M * (1 - 0.2), rel=0.04)
 
 
 def test_two_replays_of_one_record_are_the_same_to_the_bit(tmp_path: Path) -> None:
@@ -227,6 +256,22 @@ def test_update_check_and_picture_on_the_command_line(
     assert run("replay", path, "--from-depth", "--check", golden, "--update") == 0
     assert json.loads(golden.read_text())["tolerances"]["changed_in_scan"] == 1, "tolerances stay"
     assert run("replay", path, "--from-depth", "--check", golden) == 0
+
+
+def test_golden_scans_of_a_flight_with_two_cameras(tmp_path: Path) -> None:
+    path, beside = flown(tmp_path, right_m=4.0), AHEAD + 18
+    results = replayed(path)
+    first, later = results[0].result.scan, [one.result.scan for one in results[1:]]
+    assert first.state[beside] == SectorState.UNKNOWN, "the right camera's first picture came later"
+    assert all(scan.distance_m[AHEAD] == pytest.approx(WALL_M, abs=0.1) for scan in (first, *later))
+    assert all(scan.distance_m[beside] == pytest.approx(4.0, abs=0.1) for scan in later)
+    golden = golden_of(results)
+    assert compare(golden, golden_scans(replayed(path))).passed
+    flight = open_flight([path], None, [])
+    alone = flight.settings.model_copy(update={"extra_camera": ()})
+    comparison = compare(golden, golden_scans(play(alone, flight.footage, from_depth=True)))
+    assert {difference.element for difference in comparison.differences} >= {beside}
+    assert AHEAD not in {difference.element for difference in comparison.differences}
 
 
 def test_a_file_that_is_no_golden_is_not_overwritten(

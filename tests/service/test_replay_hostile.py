@@ -31,7 +31,8 @@ from service.replay.dataflash_file import read_dataflash
 from service.replay.flown_log import FlownLog
 from service.replay.golden import load_golden
 from service.replay.protobuf_fields import protobuf_fields
-from service.replay.recording import Recording, depth_of, image_of
+from service.replay.recorded_images import depth_of, image_of
+from service.replay.recording import Recording
 from service.replay.tlog_file import read_tlog
 from service.replay.ulog_file import read_ulog
 

@@ -28,6 +28,7 @@ from service.errors import CameraError, ConfigError
 from service.frame import Frame
 from service.perception_result import PerceptionResult
 from service.pipeline import Perception, make_scanner
+from service.replay.open_footage import open_flight
 from service.run import Service
 from service.settings import ExtraCameraSettings, Settings
 from service.settings.load import load_settings
@@ -160,11 +161,17 @@ def test_a_main_camera_in_trouble_silences_all() -> None:
         assert sides.added_to(blind) is blind
 
 
-def test_the_service_sends_what_all_cameras_see(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_service_sends_and_records_what_all_cameras_see(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setattr("service.side_cameras.make_camera", lambda *_: endless())
     link = FakeLink(MonotonicClock())
+    record = SETTINGS.record.model_copy(update={"enabled": True, "folder": str(tmp_path), "min_free_mib": 0})
     service = Service(
-        SETTINGS, link=link, camera=endless(), load_perception=lambda _settings: main_perception()
+        SETTINGS.model_copy(update={"record": record}),
+        link=link,
+        camera=endless(),
+        load_perception=lambda _settings: main_perception(),
     )
     service.start()
     try:
@@ -173,6 +180,11 @@ def test_the_service_sends_what_all_cameras_see(monkeypatch: pytest.MonkeyPatch)
         service.stop()
     scan = link.sent[-1][0]
     assert scan.state[AHEAD] == SectorState.OBSTACLE
+    flight = open_flight([next(tmp_path.glob("*.mcap"))], None, [])
+    assert flight.settings.extra_camera[0].mount.yaw_deg == 90.0
+    pictures = list(flight.footage.pictures())
+    assert {picture.camera for picture in pictures} == {"", "right"}
+    assert all(picture.image_bgr is not None for picture in pictures)
 
 
 # -- the configuration
