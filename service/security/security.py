@@ -81,6 +81,14 @@ class Security:
             raise SecurityError(
                 "an access list needs names that can be trusted: certificates, or a users_file, or both"
             )
+        if self.access is not None and self.certificates is None and connect:
+            # Passwords are asked for where one listens; who is reached has no name for this list, and Zenoh
+            # denies it everything without a word.
+            raise SecurityError(
+                f"an access list without certificates cannot hold at {connect[0]}: who is reached there shows "
+                "no name and would be denied everything. Leave vehicles, viewers and routers out here (the "
+                "list of the end that listens holds), or use certificates"
+            )
 
     def validity_problem(self) -> str | None:
         """Why the certificate does not hold now, or None if it does or there is none.

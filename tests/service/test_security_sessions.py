@@ -16,6 +16,7 @@ from service.publisher import keys
 from service.publisher.session import Role, open_session
 from service.security.access import Access
 from service.security.certificates import Authority
+from service.security.errors import SecurityError
 from service.security.security import Certificates, Security
 
 FLEET = Access(vehicles=("kite", "heron"), viewers=("desk",), routers=("hub",))
@@ -233,6 +234,35 @@ def test_a_wrong_password_does_not_get_in(fleet: Fleet, user: str | None, passwo
         wait_until(lambda: bool(connected(kite)))
         assert connected(hub) == {str(kite.info.zid())}
         assert connected(intruder) == set()
+
+
+def test_with_passwords_alone_the_list_of_who_listens_holds(fleet: Fleet) -> None:
+    users = fleet.private("passwords", "kite:k\ndesk:d\n")
+    access = replace(FLEET, routers=())
+    kite, desk = (
+        Security(user=name, password_file=fleet.private(f"alone-{name}", f"{name[0]}\n"))
+        for name in ("kite", "desk")
+    )
+    with (
+        router(Security(users_file=users, access=access)) as (_, endpoint),
+        open_session([], [endpoint], desk, Role.STATION) as viewer,
+        open_session([], [endpoint], kite) as vehicle,
+    ):
+        heard: list[str] = []
+        viewer.declare_subscriber("uavdepth/*/scan", lambda sample: heard.append(str(sample.key_expr)))
+
+        def speak() -> bool:
+            vehicle.put(keys.key("heron", keys.SCAN), b"spoofed")
+            vehicle.put(keys.key("kite", keys.SCAN), b"own")
+            return len(heard) >= 3
+
+        wait_until(speak)
+        assert set(heard) == {keys.key("kite", keys.SCAN)}
+        # Zenoh would deny this session everything, its own scans too, and say nothing.
+        with pytest.raises(
+            SecurityError, match=f"cannot hold at {endpoint}: who is reached there shows no name"
+        ):
+            open_session([], [endpoint], replace(kite, users_file=users, access=access))
 
 
 def test_certificate_and_password_together_name_who_it_is(fleet: Fleet) -> None:
