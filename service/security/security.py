@@ -85,8 +85,8 @@ class Security:
             # Passwords are asked for where one listens; who is reached has no name for this list, and Zenoh
             # denies it everything without a word.
             raise SecurityError(
-                f"an access list without certificates cannot hold at {connect[0]}: who is reached there shows "
-                "no name and would be denied everything. Leave vehicles, viewers and routers out here (the "
+                f"an access list without certificates cannot hold at {connect[0]}: who is reached there "
+                "shows no name and would be denied everything. Leave vehicles, viewers and routers out here (the "
                 "list of the end that listens holds), or use certificates"
             )
 
