@@ -17,8 +17,9 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 
 from service.errors import RecordError
 
-_MAX_RECORD_BYTES = 256 * 1024 * 1024
-"""No chunk or attachment of ours is near it; a hostile file claims exabytes."""
+_MAX_RECORD_BYTES = 2 * 4096 * 4096 + 2**20
+"""Depth of the largest camera (4096 x 4096, 16 bits) and what comes before it in a chunk; hostile files claim
+exabytes."""
 
 _MAX_NAMES = 10_000
 """Channels and schemas of one file."""

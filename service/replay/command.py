@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.errors import ConfigError
+from service.errors import ConfigError, RecordError
 from service.options import ConfigOption, OverridesOption
 
 if TYPE_CHECKING:
@@ -84,8 +84,8 @@ def replay(
     flights = flights_in(paths)
     if picture is not None and len(flights) > 1:
         raise ConfigError(f"replay: --picture draws one flight, not {len(flights)}")
-    passed = True
-    for files in flights:
+
+    def play_one(files: Sequence[Path]) -> bool:
         flight = open_flight(files, config, given, fps=fps, offset_s=offset)
         goldens = _golden_path(flight, check) if check is not None or update else None
         old = _old_golden(goldens, update=update, force=force) if goldens is not None else None
@@ -97,9 +97,20 @@ def replay(
         for warning in flight.footage.warnings:
             typer.echo(f"warning: {warning}", err=True)
         _tell(flight, results, time.monotonic() - begun_s)
-        if goldens is not None:
-            passed &= _hold_against(goldens, old, flight, results, update=update, picture=picture)
-    if not passed:
+        if goldens is None:
+            return True
+        return _hold_against(goldens, old, flight, results, update=update, picture=picture)
+
+    passed, broken = True, 0
+    for files in flights:
+        try:
+            passed &= play_one(files)
+        except RecordError as error:
+            broken += 1
+            typer.echo(f"uavdepth: {error}", err=True)
+    if broken and len(flights) > 1:
+        typer.echo(f"{broken} of {len(flights)} flights could not be played", err=True)
+    if broken or not passed:
         raise typer.Exit(1)
 
 
@@ -146,7 +157,6 @@ def _golden_path(flight: Flight, check: Path | None) -> Path:
 
 def _old_golden(path: Path, *, update: bool, force: bool) -> Golden | None:
     """The golden scans as they are; None where `update` makes the first."""
-    from service.errors import RecordError
     from service.replay.golden import load_golden
 
     if not update:

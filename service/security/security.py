@@ -86,8 +86,8 @@ class Security:
             # denies it everything without a word.
             raise SecurityError(
                 f"an access list without certificates cannot hold at {connect[0]}: who is reached there "
-                "shows no name and would be denied everything. Leave vehicles, viewers and routers out here (the "
-                "list of the end that listens holds), or use certificates"
+                "shows no name and would be denied everything. Leave vehicles, viewers and routers out here "
+                "(the list of the end that listens holds), or use certificates"
             )
 
     def validity_problem(self) -> str | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import struct
+import tracemalloc
 from collections.abc import Callable
 from contextlib import suppress
 from functools import lru_cache
@@ -121,17 +122,36 @@ def test_wrong_command_lines_end_with_code_2(
 
 
 def test_a_chunk_that_claims_to_hold_terabytes_costs_nothing(tmp_path: Path) -> None:
-    bomb = zstandard.ZstdCompressor().compress(b"\0" * 50_000_000)
-    for size in (2**50, 10, 50_000_000 - 1):
+    whole = 2**26
+    bomb = zstandard.ZstdCompressor().compress(b"\0" * whole)
+    for size in (2**50, whole, 10, 20_000_000):
         inside = struct.pack("<QQQII4sQ", 0, 0, size, 0, 4, b"zstd", len(bomb)) + bomb
         path = tmp_path / "bomb.mcap"
         path.write_bytes(MAGIC + bytes([6]) + struct.pack("<Q", len(inside)) + inside)
         reader = RecordReader(path)
+        tracemalloc.start()
         assert list(reader.items()) == []
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
         assert reader.ending is not None
-        assert "claims to hold" in reader.ending.reason
+        assert f"claims to hold {size} bytes" in reader.ending.reason
+        assert peak < max(2**20, 3 * size if size < whole else 0)
     path.write_bytes(MAGIC + bytes([9]) + struct.pack("<Q", 2**63) + b"x")
     assert list(RecordReader(path).items()) == []
+
+
+def test_a_broken_record_in_a_folder_is_named_and_the_others_are_played(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    good = flown(tmp_path)
+    broken = [tmp_path / "a.mcap", tmp_path / "z.mcap"]
+    for path in broken:
+        path.write_bytes(b"\x1a\x45\xdf\xa3 matroska")
+    assert run("replay", tmp_path, "--from-depth") == 1
+    told = capsys.readouterr()
+    assert f"{good.name}: 8 pictures" in told.out
+    assert all(f"{path}: is no MCAP file" in told.err for path in broken)
+    assert "2 of 3 flights could not be played" in told.err
 
 
 def only_record_errors(act: Callable[[], Any]) -> None:
