@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-WORKER = os.environ.get("PYTEST_XDIST_WORKER")
+# Before numpy and torch are imported. The tests' networks are small: threads would wait longer than compute.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+WORKER = os.environ.get("PYTEST_XDIST_WORKER")
 if WORKER is not None:
-    # Before numpy, torch and numba are imported. Threads of one process would wait for those of the other.
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
     # Numba's files on disk are not meant for two processes that compile the same loop at the same time.
     cache = Path(__file__).parents[1] / ".pytest_cache" / "numba" / WORKER
     os.environ.setdefault("NUMBA_CACHE_DIR", str(cache))

@@ -10,12 +10,12 @@ from training.encoder_distillation import EncoderDistillation
 from training.networks.catalogue import build_network
 from training.networks.resnet import load_resnet18
 
-_PICTURES = torch.rand(4, 3, 64, 64, generator=torch.Generator().manual_seed(0))
+_PICTURES = torch.rand(4, 3, 32, 32, generator=torch.Generator().manual_seed(0))
 
 
 def test_it_comes_to_tell_the_teachers_features() -> None:
-    lesson = EncoderDistillation(images=80)
-    errors = [step.error for step in lesson.run([_PICTURES] * 20)]
+    lesson = EncoderDistillation(images=48)
+    errors = [step.error for step in lesson.run([_PICTURES] * 12)]
     assert sum(errors[-3:]) < 0.7 * sum(errors[:3])
 
 
