@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 
 import zenoh
 
@@ -64,7 +65,8 @@ class Line:
         """Close the session."""
         session, self.session = self.session, None
         if session is not None:
-            session.close()  # type: ignore[no-untyped-call]
+            with suppress(zenoh.ZError):  # it is closed for good either way
+                session.close()  # type: ignore[no-untyped-call]
 
     def look(self) -> int:
         """Count the peers and routers that are there, and notice if none is at `connect`."""

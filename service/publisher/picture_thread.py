@@ -81,6 +81,7 @@ class PictureThread:
         self.problem = ""
         """What is wrong, in words; empty if nothing."""
         self._stopping = threading.Event()
+        self._silent = threading.Event()
         self._thread = threading.Thread(target=self._run, name="zenoh-pictures", daemon=True)
 
     def listening(self, session: zenoh.Session | None) -> None:
@@ -94,9 +95,14 @@ class PictureThread:
             self._thread.start()
 
     def stop(self, timeout_s: float) -> None:
-        """End."""
+        """Send nothing more, and begin to close the session; `join` waits for that."""
         self._stopping.set()
         self.results.close()
+        if self._thread.is_alive():
+            self._silent.wait(timeout_s)
+
+    def join(self, timeout_s: float) -> None:
+        """Wait for the session's end."""
         if self._thread.is_alive():
             self._thread.join(timeout_s)
 
@@ -130,6 +136,7 @@ class PictureThread:
                         self._line.drop(self.problem)
                     self._stopping.wait(_RETRY_S)
         finally:
+            self._silent.set()
             if self._line is not None:
                 self._line.close()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -21,7 +22,9 @@ from uavdepth.camera import CameraModel
 
 log = structlog.get_logger()
 
-_JOIN_TIMEOUT_S = 2.0
+_SILENT_S = 0.3
+_CLOSE_S = 0.4
+"""A session whose peer accepts and says nothing takes many seconds to close: its thread is left to that."""
 
 
 @dataclass(frozen=True)
@@ -108,10 +111,13 @@ class ZenohPublisher:
         self._scans.statuses.put(status)
 
     def close(self) -> None:
-        """Stop publishing and close the sessions."""
+        """Stop publishing and close the sessions; returns within a second, whoever does not answer."""
         # Pictures first: they also go through a session of the scans.
-        self._pictures.stop(_JOIN_TIMEOUT_S)
-        self._scans.stop(_JOIN_TIMEOUT_S)
+        self._pictures.stop(_SILENT_S)
+        self._scans.stop()
+        end_s = time.monotonic() + _CLOSE_S
+        for thread in (self._pictures, self._scans):
+            thread.join(max(0.0, end_s - time.monotonic()))
 
     def _open(self, listen: Sequence[str], connect: Sequence[str]) -> zenoh.Session:
         return open_session(listen, connect, self._settings.security)

@@ -77,11 +77,14 @@ class ScanThread:
         """Begin; waits for nothing."""
         self._thread.start()
 
-    def stop(self, timeout_s: float) -> None:
-        """End."""
+    def stop(self) -> None:
+        """Begin to end; `join` waits for that."""
         self._stopping.set()
         self.results.close()
         self.statuses.close()
+
+    def join(self, timeout_s: float) -> None:
+        """Wait for the end of the sessions."""
         if self._thread.is_alive():
             self._thread.join(timeout_s)
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -284,6 +285,40 @@ def test_a_peer_that_is_away_is_told_and_found_when_it_comes() -> None:
         with open_session([f"tcp/127.0.0.1:{port}"], []):
             wait_until(lambda: publisher.status.peers == 1)
             wait_until(lambda: publisher.status.detail == "")
+
+
+class Stubborn:
+    """A session whose peer has accepted and says nothing: it does not close."""
+
+    closing = 0
+    released = threading.Event()
+
+    def __init__(self, session: zenoh.Session) -> None:
+        self._session = session
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._session, name)
+
+    def close(self) -> None:
+        Stubborn.closing += 1
+        self.released.wait()
+        self._session.close()  # type: ignore[no-untyped-call]
+
+
+def test_nobody_waits_for_sessions_that_do_not_close(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        "service.publisher.publisher.open_session", lambda *words: Stubborn(open_session(*words))
+    )
+    settings = settings_on(free_port(), f"zenoh.connect=['tcp/127.0.0.1:{free_port()}']")
+    publisher = ZenohPublisher(settings.zenoh, "kite", settings.camera.model, MonotonicClock())
+    publisher.start()
+    wait_until(lambda: publisher.status.open)
+    publisher.close()
+    try:
+        assert not Stubborn.released.is_set(), "it has come back and they are still there"
+        wait_until(lambda: Stubborn.closing == 2)
+    finally:
+        Stubborn.released.set()
 
 
 def test_offering_never_waits_even_if_nothing_is_published() -> None:
