@@ -30,8 +30,8 @@ def fleet_document(fleet: Fleet, zenoh: ZenohView, now_ns: int) -> bytes:
         {
             "vehicles": [_summary(view, now_ns) for view in fleet.views()],
             "zenoh": {"peers": zenoh.peers, "endpoints": zenoh.endpoints},
-            "bad_samples": fleet.bad_samples,
-            "last_bad": fleet.last_bad[:300],
+            "bad_samples": fleet.bad_samples.count,
+            "last_bad": fleet.bad_samples.last[:300],
             "stale_ms": STALE_NS / 1e6,
             "no_data_ms": NO_DATA_NS / 1e6,
         }

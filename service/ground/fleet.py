@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
 import threading
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from service.bad_samples import BadSamples
 from service.clock import Clock
 from service.freshness import ArrivalClock, Freshness
 from service.ground.errors import PictureError
@@ -16,13 +16,10 @@ from service.ground.pictures import check_grey_png, check_jpeg
 from service.ground.traffic import Traffic, TrafficView
 from service.publisher import keys
 from service.publisher.wire import CameraHeader, DepthHeader, ScanSample, StatusSample, WireError
-from service.settings.vehicle import VEHICLE_NAME_PATTERN
 
 MAX_VEHICLES = 200
 """A peer that invents names must not fill the memory: the longest silent one makes room, else none."""
 
-_NAME = re.compile(VEHICLE_NAME_PATTERN)
-_MAX_NAME = 64
 _MAX_RATE_HZ = 120
 """Samples of one vehicle and topic that are read a second; what comes beyond is counted and left out."""
 
@@ -100,7 +97,7 @@ class _Vehicle:
 
 
 class Fleet:
-    """Takes samples from any thread; what cannot be understood is counted and left out.
+    """Takes samples from any thread; what cannot be understood is counted in `bad_samples`.
 
     Args:
         clock: the viewer's.
@@ -113,18 +110,7 @@ class Fleet:
         self._on_change = on_change
         self._lock = threading.Lock()
         self._vehicles: dict[str, _Vehicle] = {}
-        self._bad_samples = 0
-        self._last_bad = ""
-
-    @property
-    def bad_samples(self) -> int:
-        """Samples that were not what their key says."""
-        return self._bad_samples
-
-    @property
-    def last_bad(self) -> str:
-        """What was wrong with the last of them."""
-        return self._last_bad
+        self.bad_samples = BadSamples()
 
     def notify(self, on_change: Callable[[str], None]) -> None:
         """Call `on_change` from now on."""
@@ -141,19 +127,12 @@ class Fleet:
                 vehicle.traffic.hear(topic, len(payload) + len(attachment or b""), now_ns)
                 self._read(vehicle, topic, payload, attachment, now_ns)
             except (WireError, PictureError) as error:
-                self._bad_samples += 1
-                self._last_bad = f"{key[:100]}: {error}"
+                self.bad_samples.note(f"{key[:100]}: {error}")
                 return
             vehicle.heard_ns = now_ns
             vehicle.changes += 1
         if name is not None:
             self._on_change(name)
-
-    def note_bad(self, why: str) -> None:
-        """Count a sample that was not understood before it came here."""
-        with self._lock:
-            self._bad_samples += 1
-            self._last_bad = why
 
     def hear_alive(self, key: str, alive: bool) -> None:
         """Take the coming or going of a liveliness token."""
@@ -162,7 +141,7 @@ class Fleet:
             try:
                 vehicle = self._vehicle(name, self._clock.now_ns())
             except WireError as error:
-                self._last_bad = str(error)
+                self.bad_samples.last = str(error)
                 return
             vehicle.alive = alive
             vehicle.changes += 1
@@ -205,7 +184,7 @@ class Fleet:
             return [] if vehicle is None else vehicle.history.points(self._clock.now_ns())
 
     def _vehicle(self, name: str | None, now_ns: int) -> _Vehicle:
-        if name is None or len(name) > _MAX_NAME or not _NAME.fullmatch(name):
+        if name is None:
             raise WireError("this key is not one of ours")
         vehicle = self._vehicles.get(name)
         if vehicle is None:

@@ -5,17 +5,15 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 from contextlib import ExitStack
-from types import TracebackType
 from typing import Self
 
 import zenoh
 
 from service.clock import Clock
 from service.ground.fleet import Fleet
-from service.publisher import keys
 from service.publisher.picture_receiver import PictureReceiver
 from service.publisher.session import Role, open_session
-from service.publisher.wire import MAX_SAMPLE_BYTES
+from service.publisher.vehicle_samples import hear_vehicles
 from service.security.security import Security
 
 
@@ -56,21 +54,17 @@ class FleetListener:
                 own = stack.enter_context(open_session([], connect, security, Role.STATION))
                 self._picture_sessions.append(own)
             self._sessions = stack.pop_all()
-        for topic in (keys.SCAN, keys.STATUS):
-            self._session.declare_subscriber(keys.key("*", topic), self._hear)
-        self._session.liveliness().declare_subscriber(
-            keys.key("*", keys.ALIVE), self._hear_alive, history=True
+        hear_vehicles(
+            self._session,
+            lambda key, payload: fleet.hear(key, payload, None),
+            fleet.hear_alive,
+            fleet.bad_samples,
         )
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -97,17 +91,5 @@ class FleetListener:
             vehicle,
             self._fleet.hear,
             self._clock,
-            lambda why: self._fleet.note_bad(f"video of {vehicle}: {why}"),
+            lambda why: self._fleet.bad_samples.note(f"video of {vehicle}: {why}"),
         )
-
-    def _hear(self, sample: zenoh.Sample) -> None:
-        key = str(sample.key_expr)
-        if len(sample.payload) > MAX_SAMPLE_BYTES:
-            self._fleet.note_bad(
-                f"{key[:100]}: {len(sample.payload)} bytes: at most {MAX_SAMPLE_BYTES} are read"
-            )
-            return
-        self._fleet.hear(key, sample.payload.to_bytes(), None)
-
-    def _hear_alive(self, sample: zenoh.Sample) -> None:
-        self._fleet.hear_alive(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)

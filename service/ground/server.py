@@ -13,6 +13,7 @@ from starlette.types import ASGIApp
 
 from service.ground.browser import MAX_MESSAGE_BYTES
 from service.ground.errors import GroundError
+from service.ground.patience import ImpatientProtocol
 
 _BACKLOG = 64
 _MAX_CONNECTIONS = 200
@@ -75,6 +76,7 @@ def make_server(app: ASGIApp, tls: Tls | None) -> uvicorn.Server:
         log_level="warning",
         access_log=False,
         lifespan="on",
+        http=ImpatientProtocol,
         ws="websockets-sansio",
         ws_max_size=MAX_MESSAGE_BYTES,
         # Pictures are compressed already, and JSON of a few kB is not worth the processor time.

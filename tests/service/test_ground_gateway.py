@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import http.client
 import json
+import socket
 import struct
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import pytest
@@ -216,6 +217,27 @@ def test_the_page_comes_with_a_strict_policy_and_loads_nothing_from_elsewhere(
 @pytest.mark.parametrize("path", ["/..%2fapp.py", "/../app.py", "/page/main.js", "/app.py", "/.env"])
 def test_nothing_but_the_page_can_be_read(open_station: RunningStation, path: str) -> None:
     assert ask(open_station, "GET", path).status == 404
+
+
+@pytest.mark.parametrize(
+    "begun",
+    [
+        b"",
+        b"GET / HTTP/1.1\r\nHost: 127",
+        b"POST /login HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nContent-Length: 30\r\n\r\n{",
+    ],
+    ids=["nothing", "half a header", "half a body"],
+)
+def test_who_does_not_finish_a_request_is_let_go(
+    open_station: RunningStation, monkeypatch: pytest.MonkeyPatch, begun: bytes
+) -> None:
+    monkeypatch.setattr("service.ground.patience.REQUEST_S", 0.2)
+    with socket.create_connection(("127.0.0.1", open_station.port)) as client:
+        client.settimeout(60.0)
+        client.sendall(begun % open_station.port if b"%d" in begun else begun)
+        with suppress(ConnectionResetError):
+            while client.recv(4096):
+                pass  # until the station ends it
 
 
 def test_a_foreign_host_name_is_refused(open_station: RunningStation) -> None:

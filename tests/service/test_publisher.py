@@ -324,8 +324,9 @@ def test_nobody_waits_for_sessions_that_do_not_close(monkeypatch: pytest.MonkeyP
 def test_offering_never_waits_even_if_nothing_is_published() -> None:
     settings = settings_on(free_port())
     publisher = ZenohPublisher(settings.zenoh, "kite", settings.camera.model, MonotonicClock())
-    for index in range(1000):
-        publisher.offer(result_of(settings, index))
+    result = result_of(settings)
+    for _ in range(1000):
+        publisher.offer(result)
     assert publisher.dropped_count == 999
     publisher.close()
 
