@@ -67,7 +67,7 @@ class LiveHints:
         return points if points is not None and len(points) else None
 
     def measure(self) -> None:
-        """What can wait until a picture's distances have been sent; `update` does what was not done."""
+        """What only later pictures need; `update` begins with it where nobody called."""
         self._guarded(MotionPoints.measure)
 
     def _guarded(self, work: Callable[[MotionPoints], Result]) -> Result | None:

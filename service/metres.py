@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +19,22 @@ from service.telemetry import Telemetry
 from service.trouble import Trouble
 from service.vehicle_height import VehicleHeight
 from uavdepth.depth_map import DepthMap
-from uavdepth.hints import Hints, PointHints
+from uavdepth.hints import GroundHint, Hints, PointHints
 from uavdepth.scale_estimator import ScaleEstimate, ScaleEstimator, apply
 
 _COMPARED_EVERY_NS = 200_000_000
 
 TelemetryAt = Callable[[int], Telemetry]
+
+
+@dataclass(frozen=True)
+class _Uncompared:
+    """What a network that takes hints said, and what it was told, of one picture."""
+
+    raw: DepthMap
+    ground: GroundHint
+    points: PointHints | None
+    at_ns: int
 
 
 class Metres:
@@ -63,6 +73,7 @@ class Metres:
         # Nothing is scaled by it: it tells whether ground and points contradict each other.
         self._second_opinion = None if scale is not None else ScaleEstimator(camera, mount, "metric")
         self._compared_ns: int | None = None
+        self._uncompared: _Uncompared | None = None
         self._suspicion: str | None = None
         self._epoch: int | None = None
         self._measured_ns = 0
@@ -78,6 +89,7 @@ class Metres:
             frame: the picture, of the calibrated size.
             telemetry_at: the vehicle at a capture time.
         """
+        self.look_ahead()
         if self._found is None:
             return self._told_metres(frame, telemetry_at)
         return self._found_metres(frame, telemetry_at, self._found)
@@ -86,6 +98,7 @@ class Metres:
         """What of one picture only the next ones need; `measure` begins with it where nobody called."""
         if self._points is not None:
             self._points.measure()
+        self._compare()
 
     def without_hints(self, frame: Frame) -> DepthMap:
         """What the network says of a picture alone, in units of its own."""
@@ -120,8 +133,8 @@ class Metres:
         if math.isinf(min(by_ground, by_points)):
             return replace(measured, trouble=ground if isinstance(ground, Trouble) else Trouble.NO_POINTS)
         age_s = ground.height.age_s if isinstance(ground, KnownGround) and "points" not in sources else 0.0
-        if len(sources) > 1:
-            self._compare(raw, ground, points, frame.captured_ns)
+        if len(sources) > 1 and isinstance(ground, KnownGround):
+            self._uncompared = _Uncompared(raw, ground.hint, points, frame.captured_ns)
         scale = ScaleStatus(1.0, min(by_ground, by_points), age_s, sources, self._suspected(self._suspicion))
         trouble = self._gate(scale, ground)
         if trouble is not None:
@@ -136,16 +149,15 @@ class Metres:
             told = ground.hint
         return self._model.infer(frame.image_bgr, self._camera, Hints(told, points))
 
-    def _compare(
-        self, raw: DepthMap, ground: KnownGround | Trouble, points: PointHints | None, captured_ns: int
-    ) -> None:
+    def _compare(self) -> None:
         """See now and then whether the ground and the points agree on metres."""
-        if self._second_opinion is None or not isinstance(ground, KnownGround):
+        told, self._uncompared = self._uncompared, None
+        if told is None or self._second_opinion is None:
             return
-        if self._compared_ns is not None and 0 <= captured_ns - self._compared_ns < _COMPARED_EVERY_NS:
+        if self._compared_ns is not None and 0 <= told.at_ns - self._compared_ns < _COMPARED_EVERY_NS:
             return
-        self._compared_ns = captured_ns
-        estimate = self._second_opinion.update(raw, ground.hint, points, captured_ns)
+        self._compared_ns = told.at_ns
+        estimate = self._second_opinion.update(told.raw, told.ground, told.points, told.at_ns)
         self._suspicion = None if estimate is None else estimate.suspicion
 
     # -- a network that does not

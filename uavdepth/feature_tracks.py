@@ -56,7 +56,7 @@ class FeatureTracks:
         self.positions = np.empty((0, 0, 2), dtype=np.float32)
 
     def update(self, grey: NDArray[np.uint8], expected: NDArray[np.float32] | None = None) -> None:
-        """Follow all tracks into the next picture, and begin new ones where there are few.
+        """Follow all tracks into the next picture.
 
         Args:
             grey: (H, W) uint8; a change of size begins anew.
@@ -71,8 +71,11 @@ class FeatureTracks:
             self.positions = np.empty((self.positions.shape[0], 0, 2), dtype=np.float32)
             self._append(np.empty((0, 2), dtype=np.float32))
         self._grey = grey
-        if len(self.ids) <= MOST_TRACKS - _SPARE_TRACKS:
-            self._begin(grey)
+
+    def renew(self) -> None:
+        """Begin new tracks in the picture that was followed last, where there are few."""
+        if self._grey is not None and len(self.ids) <= MOST_TRACKS - _SPARE_TRACKS:
+            self._begin(self._grey)
 
     def _follow(
         self,

@@ -71,9 +71,9 @@ class MotionPointSettings:
 class MotionPoints:
     """Follows corners from picture to picture and measures their depth by the way the vehicle went.
 
-    Measuring takes the most time, and can wait until a picture's distances have been sent: the points of a
-    picture are those measured up to the one before it, carried along with the vehicle to where their corners
-    are seen now.
+    What takes the most time, to measure and to seek new corners, can wait until a picture's distances have
+    been sent: its points are those measured up to the picture before it, carried along with the vehicle to
+    where their corners are seen now.
 
     Nothing comes of a hover but points that were measured before; of flight along the optical axis
     nothing near the point it heads for. Objects that move are told by residuals across their epipolar
@@ -99,6 +99,7 @@ class MotionPoints:
         self._carried = CarriedPoints(camera, self.settings.carry_s)
         self._turns = TurnCheck()
         self._last = _no_points()
+        self._is_behind = False
         self._unmeasured: VehicleMotion | None = None
 
     @property
@@ -112,7 +113,7 @@ class MotionPoints:
         self._times.clear()
         self._carried.clear()
         self._last = _no_points()
-        self._unmeasured = None
+        self._is_behind, self._unmeasured = False, None
 
     def update(self, image_bgr: NDArray[np.uint8], captured_ns: int, motion: VehicleMotion) -> PointHints:
         """Points of one picture.
@@ -145,18 +146,25 @@ class MotionPoints:
                 self._tracks.clear()
                 self._times.clear()
         self._follow(image_bgr, captured_ns, motion)
+        self._is_behind = True
         self._last = self._points(captured_ns, motion)
         return self._last
 
     def measure(self) -> None:
-        """Measure the newest picture's points, for the pictures after it; `update` does what was not done."""
-        motion, self._unmeasured = self._unmeasured, None
-        if motion is None:
+        """What only later pictures need: the depth of the newest picture's points, and new corners.
+
+        The next `update` begins with it where it was not called.
+        """
+        if not self._is_behind:
             return
-        captured_ns = self._times[-1]
-        views = self._views(captured_ns, motion)
-        if views and len(self._tracks.ids):
-            self._measure(captured_ns, motion, views)
+        self._is_behind = False
+        motion, self._unmeasured = self._unmeasured, None
+        if motion is not None and len(self._tracks.ids):
+            captured_ns = self._times[-1]
+            views = self._views(captured_ns, motion)
+            if views:
+                self._measure(captured_ns, motion, views)
+        self._tracks.renew()
 
     def _follow(self, image_bgr: NDArray[np.uint8], captured_ns: int, motion: VehicleMotion) -> None:
         small = cv2.resize(image_bgr, self._size, interpolation=cv2.INTER_AREA)
