@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import re
+
+from service.settings.vehicle import MAX_VEHICLE_NAME, VEHICLE_NAME_PATTERN
+
 ROOT = "uavdepth"
 DEPTH = "depth"
 SCAN = "scan"
@@ -14,6 +18,8 @@ RECEIVED = "received"
 ALIVE = "alive"
 """Liveliness token: there while the vehicle's session lives."""
 
+_NAME = re.compile(VEHICLE_NAME_PATTERN)
+
 
 def key(vehicle: str, topic: str) -> str:
     """Key of one topic of one vehicle; `*` as vehicle stands for all."""
@@ -21,6 +27,9 @@ def key(vehicle: str, topic: str) -> str:
 
 
 def vehicle_of(text: str) -> str | None:
-    """Vehicle of a key, or None if it is not one of ours."""
+    """Vehicle of a key, or None if it is not one of ours or names none that a configuration could."""
     parts = text.split("/")
-    return parts[1] if len(parts) == 3 and parts[0] == ROOT else None
+    if len(parts) != 3 or parts[0] != ROOT:
+        return None
+    name = parts[1]
+    return name if len(name) <= MAX_VEHICLE_NAME and _NAME.fullmatch(name) else None

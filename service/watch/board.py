@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import re
 import threading
 from dataclasses import dataclass, field
 
+from service.bad_samples import BadSamples
 from service.freshness import ArrivalClock, Freshness
 from service.publisher import keys
 from service.publisher.wire import ScanSample, StatusSample, WireError
-from service.settings.vehicle import VEHICLE_NAME_PATTERN
 
-_NAME = re.compile(VEHICLE_NAME_PATTERN)
-_MAX_NAME = 64
 _MAX_VEHICLES = 200
 """A peer that invents names must not fill the memory."""
 
@@ -52,23 +49,12 @@ class VehicleView:
 
 
 class Board:
-    """Collects samples from any thread. What cannot be understood is counted and left out."""
+    """Collects samples from any thread; what cannot be understood is counted in `bad_samples`."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._vehicles: dict[str, _Vehicle] = {}
-        self._bad_samples = 0
-        self._last_bad = ""
-
-    @property
-    def bad_samples(self) -> int:
-        """Samples that were not what their key says."""
-        return self._bad_samples
-
-    @property
-    def last_bad(self) -> str:
-        """What was wrong with the last of them."""
-        return self._last_bad
+        self.bad_samples = BadSamples()
 
     def hear(self, key: str, payload: bytes, now_ns: int) -> None:
         """Take one sample of a `scan` or `status` key."""
@@ -88,8 +74,7 @@ class Board:
                     entry = self._entry(vehicle)
                     entry.status, entry.status_ns = status, now_ns
             except WireError as error:
-                self._bad_samples += 1
-                self._last_bad = str(error)
+                self.bad_samples.note(str(error))
 
     def hear_alive(self, key: str, alive: bool) -> None:
         """Take the coming or going of a liveliness token."""
@@ -100,7 +85,7 @@ class Board:
             try:
                 self._entry(vehicle).alive = alive
             except WireError as error:
-                self._last_bad = str(error)
+                self.bad_samples.last = str(error)
 
     def vehicles(self, now_ns: int) -> list[VehicleView]:
         """All vehicles by name, as they are to be shown now."""
@@ -110,10 +95,8 @@ class Board:
     def _entry(self, vehicle: str) -> _Vehicle:
         entry = self._vehicles.get(vehicle)
         if entry is None:
-            if len(vehicle) > _MAX_NAME or not _NAME.fullmatch(vehicle):
-                raise WireError(f"{vehicle[:40]!r} is no name of a vehicle")
             if len(self._vehicles) >= _MAX_VEHICLES:
-                raise WireError(f"more than {_MAX_VEHICLES} vehicles: {vehicle[:40]!r} is left out")
+                raise WireError(f"more than {_MAX_VEHICLES} vehicles: {vehicle!r} is left out")
             entry = self._vehicles[vehicle] = _Vehicle()
         return entry
 

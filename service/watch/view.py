@@ -31,8 +31,9 @@ def render_board(board: Board, places: str, now_ns: int) -> RenderableType:
     parts: list[RenderableType] = [_vehicle_panel(view) for view in views]
     if not views:
         parts.append(Text(f"no vehicle heard at {places} yet", style="yellow"))
-    if board.bad_samples:
-        parts.append(Text(f"{board.bad_samples} samples not understood: {board.last_bad}", style="yellow"))
+    bad = board.bad_samples
+    if bad.count:
+        parts.append(Text(f"{bad.count} samples not understood: {bad.last}", style="yellow"))
     return Group(*parts)
 
 
@@ -40,7 +41,7 @@ def board_json(board: Board, now_ns: int) -> str:
     """Everything that is known as one line of JSON."""
     document = {
         "vehicles": {view.name: _vehicle_document(view) for view in board.vehicles(now_ns)},
-        "bad_samples": board.bad_samples,
+        "bad_samples": board.bad_samples.count,
     }
     return json.dumps(document)
 

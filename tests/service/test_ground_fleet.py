@@ -111,8 +111,8 @@ def test_what_is_not_understood_is_counted_and_changes_nothing(
 ) -> None:
     fleet, _ = fleet_of()
     fleet.hear(KITE + topic, payload, attachment)
-    assert fleet.bad_samples == 1
-    assert words in fleet.last_bad
+    assert fleet.bad_samples.count == 1
+    assert words in fleet.bad_samples.last
     assert all(view.scan is None and view.status is None for view in fleet.views())
     assert fleet.picture("kite", topic) is None
 
@@ -144,7 +144,7 @@ def test_a_flood_of_one_vehicle_is_read_only_in_part() -> None:
     for _ in range(1000):
         fleet.hear(KITE + "scan", scan_sample().encode(), None)
     assert fleet.changes("kite") == 120
-    assert fleet.bad_samples == 880
+    assert fleet.bad_samples.count == 880
     clock.advance_s(1.0)
     fleet.hear(KITE + "scan", scan_sample().encode(), None)
     assert fleet.changes("kite") == 121

@@ -107,7 +107,14 @@ def test_a_depth_header_carries_what_metres_need() -> None:
 
 @pytest.mark.parametrize(
     ("text", "vehicle"),
-    [(key("uav1", "scan"), "uav1"), ("other/uav1/scan", None), ("uavdepth/scan", None), ("", None)],
+    [
+        (key("uav1", "scan"), "uav1"),
+        ("other/uav1/scan", None),
+        ("uavdepth/scan", None),
+        ("", None),
+        (key("no name", "scan"), None),
+        (key("v" * 65, "scan"), None),
+    ],
 )
 def test_keys_name_their_vehicle(text: str, vehicle: str | None) -> None:
     assert vehicle_of(text) == vehicle
