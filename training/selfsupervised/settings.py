@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from training.errors import TrainingSettingsError
 
 NetworkName = Literal["monodepth2", "hr-depth", "bl", "bl+fan", "bl+fan+se", "bl+fan+eca"]
-SourceKind = Literal["airsim", "kitti-raw", "kitti-odometry", "tartanair", "video", "folder"]
+SourceKind = Literal["airsim", "kitti-raw", "kitti-odometry", "tartanair", "record", "video", "folder"]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, le=1)]
 

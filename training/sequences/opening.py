@@ -12,6 +12,7 @@ from training.sequences.frame_sequence import FrameSequence
 from training.sequences.kitti_odometry import open_kitti_odometry
 from training.sequences.kitti_raw import open_kitti_raw
 from training.sequences.picture_folder import open_folder
+from training.sequences.record import open_record
 from training.sequences.split_file import read_split, split_triplets
 from training.sequences.tartanair import open_tartanair
 from training.sequences.triplets import TripletSet
@@ -21,6 +22,7 @@ _CALIBRATED: Mapping[str, Callable[[Path], Sequence[FrameSequence]]] = {
     "kitti-raw": open_kitti_raw,
     "kitti-odometry": open_kitti_odometry,
     "tartanair": open_tartanair,
+    "record": open_record,
 }
 _UNCALIBRATED: Mapping[str, Callable[[Path, Calibration], Sequence[FrameSequence]]] = {
     "airsim": open_airsim,

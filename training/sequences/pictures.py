@@ -25,6 +25,19 @@ def read_picture(path: Path) -> NDArray[np.uint8]:
         content = np.fromfile(path, np.uint8)
     except OSError as error:
         raise BrokenFrameError(f"cannot read the picture {path}: {error.strerror}") from error
+    return decode_picture(content, path)
+
+
+def decode_picture(content: NDArray[np.uint8], path: Path) -> NDArray[np.uint8]:
+    """(H, W, 3) BGR picture of the bytes of a picture file.
+
+    Args:
+        content: the bytes.
+        path: where they are from, for the error.
+
+    Raises:
+        BrokenFrameError: they are no picture.
+    """
     try:
         picture = cv2.imdecode(content, cv2.IMREAD_COLOR) if content.size else None
     except cv2.error as error:
