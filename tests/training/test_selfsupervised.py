@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from itertools import islice
 from pathlib import Path
 
 import pytest
@@ -124,7 +125,7 @@ class TestTraining:
         self, settings: Callable[..., SelfSupervisedSettings]
     ) -> None:
         trainer = make_trainer(settings(image_steps=160, batch=4))
-        losses = [float(report.terms.reprojection.detach()) for report in trainer.run()]
+        losses = [float(report.terms.reprojection.detach()) for report in islice(trainer.run(), 32)]
         assert sum(losses[-10:]) < 0.8 * sum(losses[:10])
 
     def test_networks_start_alike_but_for_their_decoders(
