@@ -12,7 +12,9 @@ from service.demo.radar import BACKGROUND_BGR, TEXT_BGR, draw_radar
 from uavdepth.depth_colors import colorize_depth
 from uavdepth.obstacle_scan import ObstacleScan
 
-PANEL_HEIGHT_PX = 360
+PANEL_WIDTH_PX, PANEL_HEIGHT_PX = 576, 360
+"""The shape of the demo's camera; pictures that fit a thin link keep it by a pixel or so only."""
+
 _CAPTION_PX = 44
 _GAP_PX = 8
 
@@ -42,16 +44,14 @@ def draw_side_by_side(
         _panel(
             colorize_depth(depth_m, near_m, far_m), f"depth, lighter = nearer ({near_m:g} to {far_m:g} m)"
         ),
-        _panel(draw_radar(scan, PANEL_HEIGHT_PX), "scan, nose up"),
+        _panel(draw_radar(scan, PANEL_HEIGHT_PX), "scan, nose up", PANEL_HEIGHT_PX),
     ]
     return _join(panels)
 
 
-def _panel(picture: NDArray[np.uint8], caption: str) -> NDArray[np.uint8]:
-    height, width = picture.shape[:2]
-    scaled_width = max(1, round(width * PANEL_HEIGHT_PX / height))
-    shown = cv2.resize(picture, (scaled_width, PANEL_HEIGHT_PX), interpolation=cv2.INTER_LINEAR)
-    bar = np.full((_CAPTION_PX, scaled_width, 3), BACKGROUND_BGR, np.uint8)
+def _panel(picture: NDArray[np.uint8], caption: str, width_px: int = PANEL_WIDTH_PX) -> NDArray[np.uint8]:
+    shown = cv2.resize(picture, (width_px, PANEL_HEIGHT_PX), interpolation=cv2.INTER_LINEAR)
+    bar = np.full((_CAPTION_PX, width_px, 3), BACKGROUND_BGR, np.uint8)
     cv2.putText(bar, caption, (8, 29), cv2.FONT_HERSHEY_SIMPLEX, 0.6, TEXT_BGR, 1, cv2.LINE_AA)
     return np.vstack([bar, np.asarray(shown, np.uint8)])
 

@@ -106,11 +106,15 @@ class TestRadar:
     def test_no_scan_is_no_empty_radar(self) -> None:
         assert np.abs(draw_radar(None, 200).astype(int) - draw_radar(scan_with({}), 200)).max() > 60
 
-    def test_the_row_holds_all_three_panels(self) -> None:
-        row = draw_side_by_side(
-            np.zeros((200, 320, 3), np.uint8), np.full((200, 320), 5.0, np.float32), scan_with({}), 1.0, 60.0
-        )
-        assert row.shape[1] > 2 * 320 * 360 / 200 + 360
+    def test_rows_of_pictures_that_fit_different_links_lie_below_each_other(self) -> None:
+        rows = [
+            draw_side_by_side(
+                np.zeros((*image, 3), np.uint8), np.full(depth, 5.0, np.float32), scan_with({}), 1.0, 60.0
+            )
+            for image, depth in (((200, 320), (200, 320)), ((50, 80), (66, 106)))
+        ]
+        assert rows[0].shape == rows[1].shape
+        assert rows[0].shape[1] > 2 * 320 * 360 / 200 + 360, "three panels"
 
 
 class TestTruth:
