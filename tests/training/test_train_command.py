@@ -1,0 +1,89 @@
+"""`uavdepth train`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import typer
+from frames import make_store
+from small_runs import PHASES, SMALL, settings
+from typer.testing import CliRunner
+
+import training.data.rendering
+import training.settings
+import training.train_command
+from training.checkpoint import Checkpoint
+from training.data.batches import FramePool
+from training.data.rendering import RenderPlan
+from training.errors import CheckpointError, TrainingSettingsError
+from training.settings import TrainingSettings
+from training.train_command import train
+from training.trainer import Trainer
+
+
+def test_a_run_goes_on_while_the_disk_is_full(
+    pool: FramePool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refuse(self: Checkpoint, path: Path) -> None:
+        raise CheckpointError(f"{path} cannot be written: No space left on device")
+
+    trainer = Trainer(settings(), pool, pretrained=False)
+    monkeypatch.setattr(Checkpoint, "save", refuse)
+    monkeypatch.setattr(training.train_command, "_SAVE_EVERY_S", 0.0)
+    with pytest.raises(CheckpointError, match="No space left"):
+        training.train_command._run(trainer, tmp_path)
+    assert trainer.progress == 1.0
+    assert capsys.readouterr().err.count("No space left") > 1
+
+
+def test_the_command_trains_and_refuses_to_overwrite(
+    pool: FramePool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def small(**arguments: object) -> TrainingSettings:
+        return TrainingSettings(**arguments, phases=PHASES, large=None, shape=SMALL)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(training.settings, "TrainingSettings", small)
+    app = typer.Typer()
+    app.command()(train)
+    words = ["--data", str(tmp_path / "frames"), "--output", str(tmp_path / "run"), "--images", "8"]
+    done = CliRunner().invoke(app, words, catch_exceptions=False)
+    assert done.exit_code == 0
+    assert Checkpoint.load(tmp_path / "run" / "checkpoint.pt").images == 8
+    assert json.loads((tmp_path / "run" / "log.jsonl").read_text())["images"] == 8
+    with pytest.raises(TrainingSettingsError, match="--resume"):
+        CliRunner().invoke(app, words, catch_exceptions=False)
+    with pytest.raises(TrainingSettingsError, match="--seed is 5, but the run was started with 0"):
+        CliRunner().invoke(app, [*words, "--resume", "--seed", "5"], catch_exceptions=False)
+    longer = [*words[:-1], "12", "--resume"]
+    assert CliRunner().invoke(app, longer, catch_exceptions=False).exit_code == 0
+    assert Checkpoint.load(tmp_path / "run" / "checkpoint.pt").images == 12
+
+
+def test_a_run_either_starts_or_goes_on(tmp_path: Path) -> None:
+    with pytest.raises(TrainingSettingsError, match="--resume"):
+        train(data=tmp_path, output=tmp_path, init=tmp_path / "old.pt", resume=True)
+
+
+def test_a_run_has_one_length(tmp_path: Path) -> None:
+    with pytest.raises(TrainingSettingsError, match="one length"):
+        train(data=tmp_path, output=tmp_path, minutes=1.0, images=5)
+
+
+def test_the_command_renders_training_worlds_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    worlds: list[tuple[str, int]] = []
+
+    def remember(plan: RenderPlan, tell: object) -> int:
+        worlds.extend(plan.worlds())
+        make_store(plan.root, (("wall", 0),))
+        return 3
+
+    monkeypatch.setattr(training.data.rendering, "render_plan", remember)
+    monkeypatch.setattr(training.train_command, "_run", lambda trainer, output: None)
+    app = typer.Typer()
+    app.command()(train)
+    words = ["--data", str(tmp_path / "frames"), "--render", "--scenes", "wall,city", "--seeds", "2"]
+    done = CliRunner().invoke(app, [*words, "--output", str(tmp_path / "run")], catch_exceptions=False)
+    assert done.exit_code == 0
+    assert worlds == [("wall", 0), ("city", 0), ("wall", 1), ("city", 1)]
