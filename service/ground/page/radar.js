@@ -129,11 +129,15 @@ function drawRings(context, { x, y, radius, opening }, maxM) {
   context.stroke();
   // Beside the left edge of what is drawn, where they hide nothing.
   const edge = Math.min(opening, radians(100));
-  for (let metres = step; metres <= maxM + 1e-6; metres += step) {
-    const at = (metres / maxM) * radius;
-    const isLast = metres + step > maxM + 1e-6;
-    const labelX = Math.max(28, x - Math.sin(edge) * at - 10);
-    label(context, isLast ? `${metres} m` : `${metres}`, labelX, y - Math.cos(edge) * at + 14);
+  const farthest = Math.floor(maxM / step + 1e-6);
+  let free = 4;
+  for (let ring = farthest; ring > 0; ring -= 1) {
+    const at = ((ring * step) / maxM) * radius;
+    const text = ring === farthest ? `${ring * step} m` : `${ring * step}`;
+    const half = text.length * 4.5 + 2;
+    const labelX = Math.max(free + half, x - Math.sin(edge) * at - 10);
+    label(context, text, labelX, y - Math.cos(edge) * at + 14);
+    free = labelX + half;
   }
 }
 
