@@ -1,19 +1,14 @@
-"""Cameras: real files, dead servers, and the rendered one with a vehicle that moves."""
+"""Cameras: real files, dead servers."""
 
 from __future__ import annotations
 
 import socket
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
-import cv2
 import numpy as np
 import pytest
-from numpy.typing import NDArray
-from program_fakes import HEIGHT, WIDTH, FakeLink, free_port, make_settings, picture
+from camera_files import MOUNT, camera_for, settings_for, shade_of, write_folder, write_video
+from program_fakes import HEIGHT, WIDTH, FakeLink, free_port
 
 from service.cameras.camera import (
     CameraEndedError,
@@ -25,49 +20,10 @@ from service.cameras.image_folder import ImageFolderCamera
 from service.cameras.pace import Pace
 from service.cameras.rendered import RenderedCamera
 from service.cameras.rtsp import RtspCamera, without_password
-from service.cameras.source import make_camera, open_camera
+from service.cameras.source import open_camera
 from service.cameras.usb import UsbCamera
 from service.clock import ManualClock, MonotonicClock
 from service.errors import CameraError, ConfigError
-from service.settings import Settings
-from service.settings.camera import CameraSettings
-from service.telemetry import Telemetry
-from uavdepth.attitude import Attitude
-from uavdepth.camera import CameraModel, CameraMount
-
-MOUNT = CameraMount()
-
-
-def settings_for(source: Path | str, *overrides: str) -> CameraSettings:
-    return make_settings(f"camera.source={source}", *overrides).camera
-
-
-def camera_for(settings: CameraSettings, clock: ManualClock | MonotonicClock | None = None) -> Any:
-    clock = clock or MonotonicClock()
-    return make_camera(settings.source, settings, clock, FakeLink(clock), MOUNT)
-
-
-def write_video(path: Path, shades: Sequence[int], fps: float = 20.0) -> Path:
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), fps, (WIDTH, HEIGHT))
-    assert writer.isOpened()
-    for shade in shades:
-        writer.write(picture(shade))
-    writer.release()
-    return path
-
-
-def write_folder(folder: Path, shades: Sequence[int]) -> Path:
-    folder.mkdir()
-    for number, shade in enumerate(shades):
-        assert cv2.imwrite(str(folder / f"shot{number}.png"), picture(shade))
-    return folder
-
-
-def shade_of(image: NDArray[np.uint8]) -> int:
-    return round(float(image.mean()))
-
-
-# -- which source is which camera
 
 
 @pytest.mark.parametrize(
@@ -110,9 +66,6 @@ def test_a_usb_camera_that_is_not_there_is_a_camera_error() -> None:
         camera.read(1.0)
 
 
-# -- picture size
-
-
 def test_a_picture_of_another_size_is_refused_with_both_sizes() -> None:
     settings = settings_for("0")
     with pytest.raises(PictureSizeError, match=r"camera 0 delivers 100x96, the configuration says 160x96"):
@@ -138,9 +91,6 @@ def test_a_grey_picture_gets_three_channels() -> None:
         WIDTH,
         3,
     )
-
-
-# -- files
 
 
 def test_pace_counts_what_is_due() -> None:
@@ -258,9 +208,6 @@ def test_an_interrupted_camera_does_not_wait_for_its_next_picture(tmp_path: Path
         camera.read(1.0)
 
 
-# -- RTSP
-
-
 def test_a_server_that_accepts_and_never_answers_is_given_up_in_time() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         url = f"rtsp://user:secret@127.0.0.1:{server.getsockname()[1]}/stream"
@@ -279,78 +226,3 @@ def test_a_closed_port_is_a_camera_error() -> None:
 def test_a_password_never_reaches_a_message() -> None:
     assert without_password("rtsp://me:pa:ss@host:554/a@b") == "rtsp://***@host:554/a@b"
     assert without_password("rtsp://host/a") == "rtsp://host/a"
-
-
-# -- rendered
-
-
-class ForwardLink(FakeLink):
-    """A vehicle that flies north by a metre a millisecond, beginning at one second."""
-
-    def telemetry_at(self, captured_ns: int) -> Telemetry:
-        return replace(
-            super().telemetry_at(captured_ns), position_ned_m=(captured_ns / 1e6 - 1000.0, 0.0, -2.0)
-        )
-
-
-class PaintedScene:
-    """A scene whose picture's shade is the vehicle's north coordinate."""
-
-    def __init__(self, clock: ManualClock, takes_s: float = 0.0) -> None:
-        self._clock, self._takes_s = clock, takes_s
-
-    def render(
-        self, camera: CameraModel, mount: CameraMount, position: Sequence[float], attitude: Attitude
-    ) -> Any:
-        self._clock.advance_s(self._takes_s)
-        return SimpleNamespace(
-            image_bgr=np.full((camera.height, camera.width, 3), int(position[0]), np.uint8)
-        )
-
-
-def rendered(clock: ManualClock, link: FakeLink, settings: Settings, takes_s: float = 0.0) -> RenderedCamera:
-    camera = make_camera("sim:wall", settings.camera, clock, link, MOUNT)
-    assert isinstance(camera, RenderedCamera)
-    camera._scene = PaintedScene(clock, takes_s)  # type: ignore[assignment]
-    camera.open()
-    return camera
-
-
-def test_the_rendered_picture_shows_the_pose_and_carries_its_time() -> None:
-    clock = ManualClock(7_000_000_000)
-    link = FakeLink(clock, position_ned_m=(42.0, 0.0, -2.0))
-    frame = rendered(clock, link, make_settings()).read(1.0)
-    assert shade_of(frame.image_bgr) == 42
-    assert frame.captured_ns == 7_000_000_000
-
-
-def test_a_picture_that_takes_time_to_render_shows_the_moment_at_which_it_is_ready() -> None:
-    clock = ManualClock(1_000_000_000)
-    link = ForwardLink(clock)
-    camera = rendered(clock, link, make_settings(), takes_s=0.08)
-    camera.read(1.0)
-    clock.advance_s(0.02)
-    frame = camera.read(1.0)
-    assert frame.captured_ns == 1_180_000_000
-    assert shade_of(frame.image_bgr) == 180
-    assert clock.now_ns() == frame.captured_ns
-
-
-def test_without_a_pose_the_rendered_camera_says_what_it_waits_for() -> None:
-    clock = ManualClock()
-    for link in (FakeLink(clock, attitude=None), FakeLink(clock, position_ned_m=None)):
-        with pytest.raises(CameraTimeoutError, match="waits for the autopilot's position and attitude"):
-            rendered(clock, link, make_settings()).read(0.0)
-
-
-def test_one_pose_makes_one_picture() -> None:
-    clock = ManualClock(1)
-    link = FakeLink(clock)
-    camera = rendered(clock, link, make_settings("camera.fps=240"))
-    camera.read(0.0)
-    clock.advance_s(0.1)
-    link.clock = ManualClock(1)  # the autopilot has sent nothing since
-    with pytest.raises(CameraTimeoutError):
-        camera.read(0.0)
-    link.clock = clock
-    assert camera.read(0.0).captured_ns == 100_000_001

@@ -211,7 +211,8 @@ class TestBlind:
             timeout=150,
             check=False,
         )
-        assert done.returncode == 1, done.stderr
+        assert done.returncode == 1
+        assert done.stdout, done.stderr
         report = json.loads(done.stdout)
         assert report["collided"] is True
         assert report["stopped"] is False

@@ -2,68 +2,14 @@
 
 from __future__ import annotations
 
-import math
 import struct
-from collections import Counter
-from typing import Any
 
 import pytest
+from fake_station import STEP_S, Station, autopilot, kinds, obstacles
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from service.fake_autopilot.autopilot import Flavor, SimulatedAutopilot, make_controller
+from service.fake_autopilot.autopilot import Flavor, make_controller
 from service.fake_autopilot.parameters import UnknownParameterError
-
-STEP_S = 0.005
-
-
-class Station:
-    """A peer of a simulated autopilot: sends whole packets, keeps what it hears."""
-
-    def __init__(self, autopilot: SimulatedAutopilot, component: int = 196) -> None:
-        self.autopilot = autopilot
-        self.channel = autopilot.open_channel()
-        self.codec = mavlink.MAVLink(None, srcSystem=1, srcComponent=component)
-        self.passed_on: list[bytes] = []
-
-    def send(self, message: Any) -> None:
-        packet = message.pack(self.codec)
-        (received,) = mavlink.MAVLink(None).parse_buffer(packet)
-        self.autopilot.receive(self.channel, received)
-
-    def command(self, command: int, *values: float, system: int = 1) -> None:
-        self.send(
-            mavlink.MAVLink_command_long_message(system, 1, command, 0, *values, *[0] * (7 - len(values)))
-        )
-
-    def hear(self, seconds: float = 0.0) -> list[Any]:
-        """Let time pass and take everything that was said."""
-        for _ in range(round(seconds / STEP_S)):
-            self.autopilot.step(STEP_S)
-        own, passed_on = self.autopilot.collect(self.channel)
-        self.passed_on += passed_on
-        return own
-
-    def answer(self, kind: str) -> Any:
-        (found,) = [message for message in self.hear() if message.get_type() == kind]
-        return found
-
-    def result(self, command: int, *values: float) -> int:
-        self.command(command, *values)
-        ack = self.answer("COMMAND_ACK")
-        assert ack.command == command
-        return int(ack.result)
-
-
-def autopilot(flavor: Flavor = "ardupilot", boot_s: float = 60.0, **changes: Any) -> SimulatedAutopilot:
-    return SimulatedAutopilot(make_controller(flavor, **changes), boot_s)
-
-
-def obstacles(word: int = 500) -> Any:
-    return mavlink.MAVLink_obstacle_distance_message(0, 4, [word] * 72, 5, 20, 2000, 5.0, -155.0, 12)
-
-
-def kinds(messages: list[Any]) -> Counter[str]:
-    return Counter(message.get_type() for message in messages)
 
 
 class TestHeartbeat:
@@ -138,80 +84,6 @@ class TestStreams:
         assert station.hear() == []
 
 
-class TestTime:
-    def test_a_time_request_is_answered_with_the_time_since_boot(self) -> None:
-        station = Station(autopilot(boot_s=60.0))
-        station.hear(1.0)
-        station.send(mavlink.MAVLink_timesync_message(0, 123456789))
-        answer = station.answer("TIMESYNC")
-        assert answer.ts1 == 123456789
-        assert answer.tc1 == pytest.approx(61.0e9, abs=1e7)
-
-    def test_it_asks_for_the_time_itself_every_10_s_and_ignores_the_answers(self) -> None:
-        station = Station(autopilot())
-        asked = [m for m in station.hear(30.0) if m.get_type() == "TIMESYNC"]
-        assert [m.tc1 for m in asked] == [0, 0, 0]
-        station.send(mavlink.MAVLink_timesync_message(5, asked[0].ts1))
-        assert station.hear() == []
-
-    def test_a_clock_step_moves_time_since_boot_and_nothing_else(self) -> None:
-        station = Station(autopilot())
-        station.hear(1.0)
-        station.autopilot.step_clock(-1.5)
-        (attitude,) = [m for m in station.hear(0.25) if m.get_type() == "ATTITUDE"]
-        assert 59500 < attitude.time_boot_ms <= 59750
-        assert station.autopilot.reboots == 0
-
-
-class TestReboot:
-    def test_the_measured_course_of_a_reboot(self) -> None:
-        station = Station(autopilot())
-        station.command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAVLINK_MSG_ID_ATTITUDE, 20000)
-        station.hear(1.0)
-        reboot = mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
-        assert station.result(reboot, 1) == mavlink.MAV_RESULT_ACCEPTED
-        station.hear(0.19)
-        assert station.autopilot.link_is_up
-        station.hear(0.03)
-        assert not station.autopilot.link_is_up
-        assert station.hear(0.4) == []
-        station.hear(0.1)
-        assert station.autopilot.link_is_up
-        assert station.hear(0.6) == []
-        heard = station.hear(1.1)
-        assert kinds(heard)["HEARTBEAT"] >= 1
-        assert kinds(heard)["ATTITUDE"] <= 6
-        (newest, *_) = [m for m in reversed(heard) if m.get_type() == "ATTITUDE"]
-        assert newest.time_boot_ms < 2500
-
-    def test_requests_during_start_up_are_acknowledged_and_lost(self) -> None:
-        station = Station(autopilot(boot_s=0.5))
-        ask = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
-        assert station.result(ask, mavlink.MAVLINK_MSG_ID_ATTITUDE, 20000) == mavlink.MAV_RESULT_ACCEPTED
-        assert kinds(station.hear(2.0))["ATTITUDE"] < 12
-        assert station.result(ask, mavlink.MAVLINK_MSG_ID_ATTITUDE, 20000) == mavlink.MAV_RESULT_ACCEPTED
-        assert kinds(station.hear(2.0))["ATTITUDE"] > 90
-
-    def test_the_position_comes_41_8_s_after_boot(self) -> None:
-        station = Station(autopilot(boot_s=41.0))
-        ask = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
-        station.command(ask, mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 33333)
-        assert kinds(station.hear(0.7))["LOCAL_POSITION_NED"] == 0
-        assert kinds(station.hear(0.5))["LOCAL_POSITION_NED"] > 5
-
-    def test_nan_in_an_obstacle_message_makes_ardupilot_start_again(self) -> None:
-        station = Station(autopilot())
-        station.send(
-            mavlink.MAVLink_obstacle_distance_message(0, 4, [500] * 72, 5, 20, 2000, math.nan, -155.0, 12)
-        )
-        texts = [m.text for m in station.hear(0.1) if m.get_type() == "STATUSTEXT"]
-        assert "Floating point exception" in texts
-        station.hear(2.0)
-        assert station.autopilot.reboots == 1
-        station.hear(5.0)
-        assert station.autopilot.reboots == 1
-
-
 class TestObstacles:
     def test_they_come_back_as_distance_sensors_beside_the_rangefinder(self) -> None:
         station = Station(autopilot())
@@ -265,60 +137,6 @@ class TestObstacles:
         fused = [m for m in station.hear(0.2) if m.get_type() == "OBSTACLE_DISTANCE"][-1]
         assert (fused.increment, fused.increment_f, fused.angle_offset, fused.frame) == (0, 5.0, 0.0, 12)
         assert set(fused.distances) == {300}
-
-
-class TestFlying:
-    def test_ardupilot_arms_takes_off_and_flies_a_body_velocity(self) -> None:
-        station = Station(autopilot(yaw_rad=math.pi / 2))
-        station.send(obstacles(65535))
-        station.command(mavlink.MAV_CMD_DO_SET_MODE, 1, 4)
-        station.hear()
-        assert station.result(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1) == mavlink.MAV_RESULT_ACCEPTED
-        assert station.result(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 5) == mavlink.MAV_RESULT_ACCEPTED
-        station.hear(8.0)
-        mask = 0b0000_0101_1100_0111
-        for _ in range(5):
-            station.send(
-                mavlink.MAVLink_set_position_target_local_ned_message(
-                    0, 1, 1, mavlink.MAV_FRAME_BODY_NED, mask, 0, 0, 0, 2.0, 0, 0, 0, 0, 0, 0, 0
-                )
-            )
-            station.hear(1.0)
-        vehicle = station.autopilot.controller.vehicle
-        assert vehicle.velocity_east_mps == pytest.approx(2.0, abs=0.1)
-        assert abs(vehicle.north_m) < 0.1
-        assert -vehicle.down_m == pytest.approx(5.0, abs=0.3)
-
-    def test_rc_overrides_are_sticks_with_pitch_forward_below_the_middle(self) -> None:
-        station = Station(autopilot())
-        station.send(mavlink.MAVLink_rc_channels_override_message(1, 1, 1750, 1150, 1500, 0, 65535, 0, 0, 0))
-        sticks = station.autopilot.controller.sticks
-        assert sticks.forward == pytest.approx(320 / 470)
-        assert sticks.right == pytest.approx(220 / 470)
-        assert (sticks.up, sticks.yaw) == (0.0, 0.0)
-
-    def test_manual_control_is_sticks_and_goes_stale(self) -> None:
-        station = Station(autopilot("px4"))
-        station.send(mavlink.MAVLink_manual_control_message(1, 700, -200, 500, 32767, 0))
-        sticks = station.autopilot.controller.sticks
-        assert (sticks.forward, sticks.right, sticks.up, sticks.yaw) == (0.7, -0.2, 0.0, 0.0)
-        station.hear(0.6)
-        assert station.autopilot.controller.sticks.forward == 0.0
-
-    def test_px4_takes_off_to_an_altitude_above_sea_level(self) -> None:
-        station = Station(autopilot("px4"))
-        station.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)
-        station.command(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, math.nan, 0, 0, 584.0 + 6.0)
-        station.hear(10.0)
-        assert -station.autopilot.controller.vehicle.down_m == pytest.approx(6.0, abs=0.3)
-        assert station.autopilot.controller.mode == "AUTO.LOITER"
-
-    def test_a_mode_that_is_not_modelled_is_denied_with_a_text(self) -> None:
-        station = Station(autopilot())
-        station.command(mavlink.MAV_CMD_DO_SET_MODE, 1, 3)
-        text, ack = station.hear()
-        assert text.text == "Mode number 3 is not modelled"
-        assert ack.result == mavlink.MAV_RESULT_DENIED
 
 
 class TestParameters:
