@@ -135,15 +135,18 @@ class RangeHistogram:
             # The front of a wall is a line too: only what ends before the next thing begins is a line alone.
             nearer = np.append(self._window_end, self._bins + 1)[line] <= starts
             starts, least = np.where(nearer, line, starts), np.where(nearer, of_row // 2, least)
-        for row in np.flatnonzero(starts < self._bins):
-            start = starts[row]
-            quantile = int(NEAR_QUANTILE * support[row, start])
-            rank = below[row, start] + max(int(least[row]), quantile)
-            distance = self.edges_m[np.searchsorted(below[row], rank) - 1]
-            if doubt is not None:
-                mean = (doubt[row, self._window_end[start]] - doubt[row, start]) / support[row, start]
-                distance *= np.float32(1.0 - mean)
-            nearest[(rows[row] - _ROWS_TO_FIRST_BEARING) % SECTOR_COUNT] = distance
+        row = np.flatnonzero(starts < self._bins)
+        start = starts[row]
+        supported = support[row, start]
+        quantile = (NEAR_QUANTILE * supported).astype(np.int64)
+        rank = below[row, start] + np.maximum(least[row], quantile)
+        # Counts of the bins below never fall from bin to bin, so this is where each row reaches its rank.
+        reached = np.count_nonzero(below[row] < rank[:, None], axis=1) - 1
+        distance = self.edges_m[reached]
+        if doubt is not None:
+            mean = (doubt[row, self._window_end[start]] - doubt[row, start]) / supported
+            distance = distance * (1.0 - mean).astype(np.float32)
+        nearest[(rows[row] - _ROWS_TO_FIRST_BEARING) % SECTOR_COUNT] = distance
         return nearest
 
     def _lines(self, enough: NDArray[np.bool_], rows: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -162,8 +165,7 @@ class RangeHistogram:
 
     def _summed_doubt(self, size: int, rows: NDArray[np.intp]) -> NDArray[np.float64]:
         """(rows, bins + 1) shortening of all points below each bin."""
-        wanted = np.flatnonzero(self._cells[: self._used])
-        total = np.bincount(self._cells[wanted], self._doubt[wanted], size)[1:size]
+        total = np.bincount(self._cells[: self._used], self._doubt[: self._used], size)[1:size]
         total = total.reshape(SECTOR_COUNT + 1, self._bins)
         total[0] += total[-1]
         below = np.zeros((rows.size, self._bins + 1))
