@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from link_support import Voice
+from mcap.reader import make_reader
 from program_fakes import HEIGHT, LEVEL, WIDTH, make_settings
 
+from service.clock import ManualClock
 from service.frame import Frame
 from service.perception_result import PerceptionResult
+from service.recorder.recorder import Recorder
 from service.scale_status import ScaleStatus
 from service.settings import Settings
 from service.telemetry import Telemetry
@@ -52,3 +57,39 @@ def result_at(index: int, captured_ns: int, rng: np.random.Generator | None = No
         ScaleStatus(1.0, 0.1, 0.0),
         scan_with(),
     )
+
+
+HEARTBEAT = Voice().heartbeat()
+
+
+def record_of(folder: Path, *overrides: str, pictures: int = 12) -> Path:
+    """A record of pictures at 10 Hz and a heartbeat each way between them."""
+    clock = ManualClock(5 * SECOND_NS)
+    recorder = Recorder(
+        record_settings(folder, *overrides), clock, lambda: '{"name": "net"}', lambda: WALL_NS
+    )
+    for i in range(pictures):
+        at_ns = clock.now_ns()
+        recorder.offer_packets(HEARTBEAT, at_ns, False)
+        recorder.offer_packets(HEARTBEAT, at_ns + 1, True)
+        recorder.offer(result_at(i, at_ns), at_ns + 10, at_ns + 20)
+        clock.advance_s(0.1)
+    recorder.start()
+    recorder.stop()
+    return sorted(folder.glob("*.mcap"))[0]
+
+
+def contents(
+    path: Path,
+) -> tuple[dict[str, list[Any]], dict[str, bytes], dict[str, dict[str, str]], dict[str, str]]:
+    """Messages by topic, attachments, metadata, schema names by topic."""
+    topics: dict[str, list[Any]] = {}
+    schemas: dict[str, str] = {}
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        for schema, channel, message in reader.iter_messages():
+            topics.setdefault(channel.topic, []).append(message)
+            schemas[channel.topic] = schema.name if schema else ""
+        attachments = {item.name: item.data for item in reader.iter_attachments()}
+        metadata = {item.name: dict(item.metadata) for item in reader.iter_metadata()}
+    return topics, attachments, metadata, schemas

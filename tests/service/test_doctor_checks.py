@@ -2,84 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import pytest
+from doctor_vehicles import COPTER, GOOD_RATES, PLAN, PX4, about, bad
 
 from service.autopilot.byte_budget import bytes_per_s_of
 from service.doctor.checks import examine
 from service.doctor.finding import Finding, Level, has_failure
-from service.doctor.observation import Observation, Plan, Probe
-from service.doctor.safe_speed import reaction_s, safe_speed_mps
-
-PLAN = Plan(wanted_hz={"ATTITUDE": 50.0, "LOCAL_POSITION_NED": 30.0, "DISTANCE_SENSOR": 20.0}, latency_s=0.1)
-GOOD_RATES = {"ATTITUDE": 49.4, "LOCAL_POSITION_NED": 28.7, "DISTANCE_SENSOR": 19.3}
-COPTER = Observation(
-    endpoint="serial:/dev/ttyAMA0:921600",
-    bytes_received=30_000,
-    autopilot="ardupilot",
-    version=(4, 8, 0),
-    system_id=1,
-    mode="LOITER",
-    armed=False,
-    rates_hz=GOOD_RATES,
-    rangefinder_hz=19.3,
-    rangefinder_m=0.1,
-    parameters={
-        "PRX1_TYPE": 2,
-        "PRX1_ORIENT": 0,
-        "PRX1_YAW_CORR": 0,
-        "PRX1_MIN": 0,
-        "PRX1_MAX": 0,
-        "PRX_IGN_GND": 0,
-        "PRX_FILT": 5.0,
-        "PRX_LOG_RAW": 1,
-        "AVOID_ENABLE": 7,
-        "AVOID_MARGIN": 2.0,
-        "AVOID_BEHAVE": 1,
-        "AVOID_DIST_MAX": 5.0,
-        "OA_TYPE": 0,
-        "GUID_OPTIONS": 0,
-        "RNGFND1_TYPE": 100,
-        "RNGFND1_ORIENT": 25,
-        "LOIT_SPEED_MS": 5.0,
-    },
-    probe=Probe.SENT,
-    proximity_before=False,
-    proximity_during=True,
-)
-PX4 = replace(
-    COPTER,
-    autopilot="px4",
-    version=(1, 18, 0),
-    mode="POSCTL",
-    parameters={
-        "CP_DIST": 5.0,
-        "CP_DELAY": 0.4,
-        "CP_GO_NO_DATA": 0,
-        "MPC_POS_MODE": 4,
-        "MAV_SYS_ID": 1,
-        "MPC_VEL_MANUAL": 5.0,
-    },
-    probe=Probe.NO_ANSWER_EXPECTED,
-    proximity_before=True,
-    proximity_during=None,
-    fused_map=True,
-)
-
-
-def with_parameters(seen: Observation, **changes: float) -> Observation:
-    return replace(seen, parameters={**seen.parameters, **changes})
-
-
-def about(topic: str, seen: Observation, plan: Plan = PLAN) -> Finding:
-    (found,) = [finding for finding in examine(seen, plan) if finding.topic == topic]
-    return found
-
-
-def bad(seen: Observation, plan: Plan = PLAN) -> list[str]:
-    return [f.topic for f in examine(seen, plan) if f.level in (Level.WARNING, Level.FAILURE)]
+from service.doctor.observation import Observation, Probe
 
 
 @pytest.mark.parametrize("seen", [COPTER, PX4], ids=["ardupilot", "px4"])
@@ -100,95 +31,6 @@ def test_everything_that_is_bad_comes_with_a_fix() -> None:
         findings = [f for f in examine(seen, PLAN) if f.level in (Level.WARNING, Level.FAILURE)]
         assert findings
         assert [f.text for f in findings if not f.fix] == []
-
-
-ARDUPILOT_RULES: list[tuple[str, float, Level, float | None]] = [
-    ("PRX1_TYPE", 0, Level.FAILURE, 2),
-    ("PRX1_TYPE", 4, Level.FAILURE, 2),
-    ("PRX1_ORIENT", 1, Level.FAILURE, 0),
-    ("PRX1_YAW_CORR", 22, Level.FAILURE, 0),
-    ("PRX1_MIN", 0.6, Level.WARNING, 0),
-    ("PRX1_MAX", 6.0, Level.WARNING, 0),
-    ("PRX_IGN_GND", 1, Level.WARNING, 0),
-    ("PRX_FILT", 0.25, Level.WARNING, 0),
-    ("PRX_FILT", 0.0, Level.OK, 0),
-    ("PRX_FILT", 8.0, Level.OK, 8),
-    ("PRX_LOG_RAW", 0, Level.NOTE, 1),
-    ("AVOID_ENABLE", 0, Level.FAILURE, 3),
-    ("AVOID_ENABLE", 1, Level.FAILURE, 3),
-    ("AVOID_ENABLE", 5, Level.FAILURE, 7),
-    ("AVOID_ENABLE", 3, Level.OK, 3),
-    ("AVOID_MARGIN", 0.5, Level.WARNING, 2),
-    ("AVOID_MARGIN", 20.0, Level.FAILURE, 2),
-    ("AVOID_BEHAVE", 0, Level.NOTE, 1),
-    ("AVOID_DIST_MAX", 0, Level.NOTE, 5),
-    ("OA_TYPE", 0, Level.NOTE, None),
-    ("RNGFND1_ORIENT", 0, Level.WARNING, 25),
-    ("RNGFND1_ORIENT", 25, Level.OK, 25),
-]
-
-
-@pytest.mark.parametrize(("name", "value", "level", "recommended"), ARDUPILOT_RULES)
-def test_r14_ardupilots_parameters(name: str, value: float, level: Level, recommended: float | None) -> None:
-    finding = about(name, with_parameters(COPTER, **{name: value}))
-    assert (finding.level, finding.recommended, finding.value) == (level, recommended, value)
-
-
-def test_bendy_ruler_leaves_guided_position_alone_without_its_option() -> None:
-    finding = about("OA_TYPE", with_parameters(COPTER, OA_TYPE=1, GUID_OPTIONS=1))
-    assert (finding.level, finding.parameter, finding.recommended) == (Level.WARNING, "GUID_OPTIONS", 65)
-
-
-def test_r21_bendy_ruler_wants_the_3d_message() -> None:
-    seen = with_parameters(COPTER, OA_TYPE=1, GUID_OPTIONS=64)
-    assert about("OA_TYPE", seen).level is Level.WARNING
-    assert "5 m too low" in about("OA_TYPE", seen).text
-    assert about("OA_TYPE", seen, replace(PLAN, sends_3d=True)).level is Level.OK
-
-
-PX4_RULES: list[tuple[str, float, Level, float | None]] = [
-    ("CP_DIST", -1.0, Level.FAILURE, 3),
-    ("CP_DIST", 0.0, Level.FAILURE, 3),
-    ("CP_DIST", 1.5, Level.WARNING, 3),
-    ("CP_DIST", 20.0, Level.FAILURE, 3),
-    ("CP_DELAY", 0.2, Level.WARNING, 0.4),
-    ("CP_DELAY", 0.3, Level.OK, 0.3),
-    ("CP_DELAY", 0.5, Level.OK, 0.5),
-    ("CP_DELAY", 1.0, Level.NOTE, 0.4),
-    ("CP_GO_NO_DATA", 1, Level.NOTE, None),
-    ("MAV_SYS_ID", 2, Level.WARNING, 1),
-]
-
-
-@pytest.mark.parametrize(("name", "value", "level", "recommended"), PX4_RULES)
-def test_r14_px4s_parameters(name: str, value: float, level: Level, recommended: float | None) -> None:
-    finding = about(name, with_parameters(PX4, **{name: value}))
-    assert (finding.level, finding.recommended, finding.value) == (level, recommended, value)
-
-
-@pytest.mark.parametrize(
-    ("version", "value", "level", "recommended"),
-    [
-        ((1, 15, 4), 4, Level.FAILURE, 0),
-        ((1, 15, 4), 0, Level.OK, 0),
-        ((1, 14, 0), 4, Level.FAILURE, 0),
-        ((1, 16, 0), 4, Level.WARNING, None),
-        ((1, 18, 0), 4, Level.OK, 4),
-        ((1, 18, 0), 0, Level.WARNING, 4),
-        (None, 4, Level.WARNING, None),
-    ],
-)
-def test_the_position_mode_that_is_right_depends_on_px4s_version(
-    version: tuple[int, int, int] | None, value: float, level: Level, recommended: float | None
-) -> None:
-    finding = about("MPC_POS_MODE", with_parameters(replace(PX4, version=version), MPC_POS_MODE=value))
-    assert (finding.level, finding.recommended) == (level, recommended)
-
-
-def test_without_a_latency_the_delay_is_a_note_that_says_where_to_read_it() -> None:
-    finding = about("CP_DELAY", PX4, replace(PLAN, latency_s=None))
-    assert (finding.level, finding.recommended) == (Level.NOTE, None)
-    assert "uavdepth watch" in finding.fix
 
 
 class TestNoHeartbeat:
@@ -326,55 +168,6 @@ class TestMode:
         finding = about("arming", replace(COPTER, refusals=("PreArm: PRX1: No Data",)))
         assert "PRX1: No Data" in finding.text
         assert "uavdepth run" in finding.fix
-
-
-class TestParameters:
-    def test_missing_ones_are_named(self) -> None:
-        seen = replace(COPTER, unanswered=("LOIT_SPEED_MS", "PRX_LOG_RAW"))
-        finding = about("parameters", seen)
-        assert finding.level is Level.NOTE
-        assert "LOIT_SPEED_MS, PRX_LOG_RAW" in finding.text
-
-    def test_an_essential_one_that_is_missing_is_a_warning_and_never_ok(self) -> None:
-        rest = {name: value for name, value in COPTER.parameters.items() if name != "PRX1_TYPE"}
-        seen = replace(COPTER, parameters=rest, unanswered=("PRX1_TYPE",))
-        assert about("parameters", seen).level is Level.WARNING
-        assert "PRX1_TYPE" not in [finding.topic for finding in examine(seen, PLAN)]
-
-    def test_no_answer_at_all_is_a_failure(self) -> None:
-        assert about("parameters", replace(COPTER, parameters={}, unanswered=("PRX1_TYPE",))).level is (
-            Level.FAILURE
-        )
-
-
-class TestSafeSpeed:
-    @pytest.mark.parametrize(("range_m", "speed_mps"), [(8.0, 3.3), (15.0, 5.0), (20.0, 5.9)])
-    def test_it_gives_the_measured_speeds_for_a_margin_of_2_metres(
-        self, range_m: float, speed_mps: float
-    ) -> None:
-        assert round(safe_speed_mps(range_m, 2.0, reaction_s(None, None)), 1) == speed_mps
-
-    def test_the_vehicle_stands_at_the_margin_after_reaction_and_braking(self) -> None:
-        speed = safe_speed_mps(12.0, 2.0, 0.7)
-        assert 0.7 * speed + speed**2 / 2.0 == pytest.approx(10.0)
-
-    def test_the_default_filter_is_as_bad_as_0_64_seconds_of_latency(self) -> None:
-        lag_s = reaction_s(None, 0.25) - reaction_s(None, 0.0)
-        assert lag_s == pytest.approx(0.64, abs=0.005)
-        assert lag_s * 3.3 == pytest.approx(2.1, abs=0.05)  # metres read too long at 3.3 m/s, measured
-
-    @pytest.mark.parametrize("margin_m", [20.0, 25.0, math.inf])
-    def test_there_is_no_safe_speed_without_room(self, margin_m: float) -> None:
-        assert safe_speed_mps(20.0, margin_m, 0.1) == 0.0
-
-    def test_a_stick_that_allows_more_is_a_warning_with_the_speed_to_set(self) -> None:
-        finding = about("safe speed", with_parameters(COPTER, LOIT_SPEED_MS=12.5))
-        assert (finding.level, finding.parameter) == (Level.WARNING, "LOIT_SPEED_MS")
-        assert finding.recommended is not None
-        assert 5.0 < finding.recommended < 5.9
-
-    def test_a_shorter_range_lowers_it(self) -> None:
-        assert about("safe speed", COPTER, replace(PLAN, range_m=8.0)).level is Level.WARNING
 
 
 def test_only_failures_make_the_command_fail() -> None:

@@ -53,9 +53,9 @@ class TestAStreetThatNoTrainingSaw:
         flown = fly(street, to_the_facade, flavor)
         assert flown.outcome is Outcome.STOPPED
         assert flown.way_m > 5.0, "it must have flown"
-        assert flown.way_m < to_the_facade.length_m - 1.0
+        assert flown.way_m < to_the_facade.length_m - 2.0
 
     def test_the_same_flight_without_seeing_hits_it(self, street: Scene, to_the_facade: Route) -> None:
         flown = fly(street, to_the_facade, "ardupilot", seeing=False)
         assert flown.outcome is Outcome.TOUCHED
-        assert flown.way_m == pytest.approx(to_the_facade.length_m, abs=0.8)
+        assert flown.way_m > to_the_facade.length_m - 2.0

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from link_support import Conversation, Flight, Voice
+from hold_talk import MS, S, Talk
+from link_support import Voice
 from numpy.typing import NDArray
 from program_fakes import (
     FLYING_HEIGHT_M,
@@ -36,8 +37,6 @@ from uavdepth.depth_map import DepthMap
 from uavdepth.hints import Hints
 from uavdepth.scanner import ObstacleScanner
 
-S, MS = 1_000_000_000, 1_000_000
-PX4_HOLD = 4 << 16 | 3 << 24
 LAST_MESSAGE_NS = 10 * S
 
 
@@ -153,130 +152,6 @@ class TestWhenItIsAsked:
             last_ns = back_ns + 3100 * MS
         again = well(last_ns + S, trouble=Trouble.STALLED, sent_ns=last_ns)
         assert asked(again, on_loss=on_loss) == 1
-
-
-@dataclass
-class Talk:
-    """A session beside a vehicle that answers what the test wants."""
-
-    autopilot: int = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
-    kind: int = mavlink.MAV_TYPE_QUADROTOR
-    mode: int = 5
-    talk: Conversation = field(default_factory=lambda: Conversation(S))
-    voice: Voice = field(default_factory=Voice)
-
-    def __post_init__(self) -> None:
-        self.beat(self.mode)
-
-    def beat(self, mode: int) -> None:
-        self.talk.hear(self.voice.heartbeat(self.kind, self.autopilot, custom_mode=mode))
-
-    def answer(self, result: int, component: int = 196) -> None:
-        ack = mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_DO_SET_MODE, result, 0, 0, 1, component)
-        self.talk.hear(self.voice.pack(ack))
-
-    @property
-    def commands(self) -> list[tuple[float, float, int]]:
-        """Main mode, sub mode and confirmation of the requests sent."""
-        return [
-            (m.param2, m.param3, m.confirmation)
-            for _, m in self.talk.sent_of("COMMAND_LONG")
-            if m.command == mavlink.MAV_CMD_DO_SET_MODE
-        ]
-
-    @property
-    def outcome(self) -> HoldOutcome | None:
-        return self.talk.session.status(self.talk.now_ns).hold
-
-
-class TestHowItIsAsked:
-    @pytest.mark.parametrize(
-        ("autopilot", "kind", "mode", "name", "command"),
-        [
-            (mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, mavlink.MAV_TYPE_QUADROTOR, 5, "BRAKE", (17, 0, 0)),
-            (mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, mavlink.MAV_TYPE_HEXAROTOR, 4, "BRAKE", (17, 0, 0)),
-            (mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, mavlink.MAV_TYPE_GROUND_ROVER, 15, "HOLD", (4, 0, 0)),
-            (mavlink.MAV_AUTOPILOT_PX4, mavlink.MAV_TYPE_QUADROTOR, 3 << 16, "Hold", (4, 3, 0)),
-        ],
-    )
-    def test_each_vehicle_by_its_own_mode(
-        self, autopilot: int, kind: int, mode: int, name: str, command: tuple[int, int, int]
-    ) -> None:
-        talk = Talk(autopilot, kind, mode)
-        assert talk.talk.session.ask_to_hold() == name
-        talk.talk.wait_s(0.1)
-        talk.answer(mavlink.MAV_RESULT_ACCEPTED)
-        talk.talk.wait_s(2.0)
-        assert talk.commands == [command]
-        assert talk.outcome is HoldOutcome.GRANTED
-
-    def test_a_vehicle_without_such_a_mode_is_not_asked(self) -> None:
-        talk = Talk(kind=mavlink.MAV_TYPE_FIXED_WING)
-        assert talk.talk.session.ask_to_hold() == ""
-        talk.talk.wait_s(1.0)
-        assert talk.commands == []
-        assert talk.outcome is HoldOutcome.IMPOSSIBLE
-
-    def test_a_lost_command_is_sent_again_twice(self) -> None:
-        talk = Talk()
-        talk.talk.session.ask_to_hold()
-        talk.talk.wait_s(3.0)
-        assert [confirmation for *_, confirmation in talk.commands] == [0, 1, 2]
-        assert talk.outcome is HoldOutcome.UNANSWERED
-
-    def test_a_refused_brake_becomes_loiter_and_a_refused_loiter_is_the_end(self) -> None:
-        talk = Talk(mode=4)
-        talk.talk.session.ask_to_hold()
-        for _ in range(2):
-            talk.talk.wait_s(0.1)
-            talk.answer(mavlink.MAV_RESULT_FAILED)
-        talk.talk.wait_s(2.0)
-        assert [main for main, *_ in talk.commands] == [17, 5]
-        assert talk.outcome is HoldOutcome.REFUSED
-
-    def test_the_answer_to_another_stations_command_is_not_taken_for_ours(self) -> None:
-        talk = Talk()
-        talk.talk.session.ask_to_hold()
-        talk.talk.wait_s(0.1)
-        talk.answer(mavlink.MAV_RESULT_FAILED, component=190)
-        assert talk.outcome is HoldOutcome.ASKED
-
-    def test_a_mode_that_somebody_else_has_chosen_ends_the_request(self) -> None:
-        talk = Talk()
-        talk.talk.session.ask_to_hold()
-        talk.talk.wait_s(0.1)
-        talk.beat(0)
-        talk.talk.wait_s(2.0)
-        assert len(talk.commands) == 1
-        assert talk.outcome is HoldOutcome.OVERRULED
-
-    def test_a_granted_request_is_not_sent_again_when_the_pilot_flies_on(self) -> None:
-        talk = Talk()
-        talk.talk.session.ask_to_hold()
-        talk.talk.wait_s(0.1)
-        talk.beat(17)
-        assert talk.outcome is HoldOutcome.GRANTED
-        talk.beat(5)
-        talk.talk.wait_s(2.0)
-        assert len(talk.commands) == 1
-        assert talk.outcome is HoldOutcome.OVERRULED
-
-    def test_what_a_broken_line_kept_back_is_not_asked_when_it_is_back(self) -> None:
-        talk = Talk()
-        talk.talk.session.ask_to_hold()
-        talk.talk.session.line_failed("cable out")
-        talk.talk.wait_s(20.0)
-        talk.talk.session.line_opened(talk.talk.now_ns)
-        talk.beat(5)
-        talk.talk.wait_s(2.0)
-        assert talk.commands == []
-        assert talk.outcome is HoldOutcome.UNANSWERED
-
-    def test_nothing_is_asked_before_an_autopilot_is_heard(self) -> None:
-        talk = Conversation(S)
-        assert talk.session.ask_to_hold() == ""
-        Flight(talk, Voice()).fly(1.0)
-        assert talk.session.status(talk.now_ns).hold is None
 
 
 def test_half_a_second_after_the_last_distances_the_pilot_has_a_text_and_the_heartbeat_is_critical() -> None:

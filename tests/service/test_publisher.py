@@ -2,33 +2,19 @@
 
 from __future__ import annotations
 
-import socket
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pytest
 import zenoh
-from program_fakes import free_port, make_settings, picture, wait_until, wall_over_ground
+from program_fakes import free_port, wait_until, wall_over_ground
+from publisher_support import Heard, listening, publishing, result_of, settings_on
 
 from service.clock import ManualClock, MonotonicClock
-from service.errors import PublisherError
-from service.frame import Frame
-from service.pipeline import PerceptionResult, unknown_scan
 from service.publisher.picture_receiver import PictureReceiver
 from service.publisher.publisher import ZenohPublisher
 from service.publisher.session import MAX_MESSAGE_BYTES, Role, open_session
 from service.publisher.topics import PictureTopics
 from service.publisher.wire import CameraHeader, DepthHeader, ScanSample, StatusSample
-from service.scale_status import ScaleStatus
-from service.security.errors import SecurityError
-from service.settings import Settings
-from service.settings.zenoh import ZenohSettings
-from service.telemetry import Telemetry
 from service.trouble import Trouble
 from uavdepth.depth_codec import decode_depth_png
 from uavdepth.depth_map import DepthMap
@@ -43,56 +29,6 @@ STATUS = StatusSample(
     link_connected=True,
     memory_mib=100.0,
 )
-
-
-def settings_on(port: int, *overrides: str) -> Settings:
-    return make_settings(
-        "zenoh.enabled=true", "vehicle.name=kite", f"zenoh.listen=['tcp/127.0.0.1:{port}']", *overrides
-    )
-
-
-def result_of(settings: Settings, index: int = 0, trouble: Trouble | None = None) -> PerceptionResult:
-    depth = DepthMap(wall_over_ground(settings.camera.model, 8.0))
-    frame = Frame(picture(200), 1_000 + index, index)
-    return PerceptionResult(
-        frame, Telemetry(0), depth, ScaleStatus(4.0, 0.05, 0.0), unknown_scan(0.2, 20.0), trouble
-    )
-
-
-class Heard:
-    """Samples by topic, and liveliness."""
-
-    def __init__(self, session: zenoh.Session, vehicle: str = "kite") -> None:
-        self.samples: dict[str, list[zenoh.Sample]] = {}
-        self.alive: list[bool] = []
-        session.declare_subscriber(f"uavdepth/{vehicle}/*", self._hear)
-        session.liveliness().declare_subscriber(
-            f"uavdepth/{vehicle}/alive",
-            lambda sample: self.alive.append(sample.kind == zenoh.SampleKind.PUT),
-            history=True,
-        )
-
-    def _hear(self, sample: zenoh.Sample) -> None:
-        self.samples.setdefault(str(sample.key_expr).rpartition("/")[2], []).append(sample)
-
-    def has(self, *topics: str) -> bool:
-        return all(self.samples.get(topic) for topic in topics)
-
-
-@contextmanager
-def publishing(settings: Settings) -> Iterator[ZenohPublisher]:
-    publisher = ZenohPublisher(settings.zenoh, settings.vehicle.name, settings.camera.model, MonotonicClock())
-    publisher.start()
-    try:
-        yield publisher
-    finally:
-        publisher.close()
-
-
-@contextmanager
-def listening(port: int) -> Iterator[Heard]:
-    with open_session([], [f"tcp/127.0.0.1:{port}"]) as session:
-        yield Heard(session)
 
 
 def test_a_ground_station_gets_scan_depth_camera_and_status() -> None:
@@ -231,21 +167,6 @@ def test_topics_that_are_declared_anew_hear_each_report_once() -> None:
         assert set(heard) == {"third"}
 
 
-def test_certificates_that_cannot_be_used_stop_the_program_with_the_file(tmp_path: Path) -> None:
-    table = {name: str(tmp_path / name) for name in ("ca", "certificate", "key")}
-    settings = ZenohSettings(listen=("tls/127.0.0.1:7447",), **table)
-    with pytest.raises(SecurityError, match=r"ca .*: no such file"):
-        ZenohPublisher(settings, "kite", make_settings().camera.model, MonotonicClock())
-
-
-def test_liveliness_goes_with_the_publisher() -> None:
-    port = free_port()
-    with publishing(settings_on(port)) as publisher, listening(port) as heard:
-        wait_until(lambda: heard.alive == [True])
-        publisher.close()
-        wait_until(lambda: heard.alive == [True, False])
-
-
 def test_without_scale_no_depth_is_published_and_the_scan_says_why() -> None:
     port = free_port()
     settings = settings_on(port, "zenoh.camera=false")
@@ -260,65 +181,6 @@ def test_without_scale_no_depth_is_published_and_the_scan_says_why() -> None:
         scan = ScanSample.decode(heard.samples["scan"][0].payload.to_bytes())
         assert (scan.trusted, scan.trouble) == (False, "no height above ground")
         assert set(heard.samples) == {"scan"}
-
-
-def test_a_port_in_use_is_told_and_taken_when_it_is_free() -> None:
-    blocker = socket.create_server(("127.0.0.1", 0))
-    port = blocker.getsockname()[1]
-    try:
-        with publishing(settings_on(port)) as publisher:
-            wait_until(lambda: "in use" in publisher.status.detail)
-            assert f"tcp/127.0.0.1:{port} is in use by another program" in publisher.status.detail
-            assert not publisher.status.open
-            blocker.close()
-            wait_until(lambda: publisher.status.open)
-            assert publisher.status.detail == ""
-    finally:
-        blocker.close()
-
-
-def test_a_peer_that_is_away_is_told_and_found_when_it_comes() -> None:
-    port = free_port()
-    settings = settings_on(port, "zenoh.listen=[]", f"zenoh.connect=['tcp/127.0.0.1:{port}']")
-    with publishing(settings) as publisher:
-        wait_until(lambda: "no peer at" in publisher.status.detail)
-        with open_session([f"tcp/127.0.0.1:{port}"], []):
-            wait_until(lambda: publisher.status.peers == 1)
-            wait_until(lambda: publisher.status.detail == "")
-
-
-class Stubborn:
-    """A session whose peer has accepted and says nothing: it does not close."""
-
-    closing = 0
-    released = threading.Event()
-
-    def __init__(self, session: zenoh.Session) -> None:
-        self._session = session
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._session, name)
-
-    def close(self) -> None:
-        Stubborn.closing += 1
-        self.released.wait()
-        self._session.close()  # type: ignore[no-untyped-call]
-
-
-def test_nobody_waits_for_sessions_that_do_not_close(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        "service.publisher.publisher.open_session", lambda *words: Stubborn(open_session(*words))
-    )
-    settings = settings_on(free_port(), f"zenoh.connect=['tcp/127.0.0.1:{free_port()}']")
-    publisher = ZenohPublisher(settings.zenoh, "kite", settings.camera.model, MonotonicClock())
-    publisher.start()
-    wait_until(lambda: publisher.status.open)
-    publisher.close()
-    try:
-        assert not Stubborn.released.is_set(), "it has come back and they are still there"
-        wait_until(lambda: Stubborn.closing == 2)
-    finally:
-        Stubborn.released.set()
 
 
 def test_offering_never_waits_even_if_nothing_is_published() -> None:
@@ -370,29 +232,3 @@ def test_rates_are_kept_by_the_services_clock() -> None:
             assert indices == [0, 2]
     finally:
         publisher.close()
-
-
-@pytest.mark.parametrize(
-    ("listen", "words"),
-    [
-        ("tcp/203.0.113.7:7447", "is no address of this computer"),
-        ("tcp/no-such-host.invalid:7447", "failed to lookup"),
-        ("tcp/127.0.0.1:7447#so_sndbuf=much", "much"),
-    ],
-)
-def test_an_endpoint_that_cannot_be_listened_on_is_named(listen: str, words: str) -> None:
-    with pytest.raises(PublisherError, match=words) as refusal:
-        open_session([listen], [])
-    assert listen.split("#")[0] in str(refusal.value)
-    assert ".rs:" not in str(refusal.value)
-
-
-def test_sessions_do_not_find_each_other_by_themselves() -> None:
-    with open_session([f"tcp/127.0.0.1:{free_port()}"], []) as one, open_session([], []) as other:
-        heard = Heard(other)
-        pause = threading.Event()
-        for _ in range(10):
-            one.put("uavdepth/kite/scan", b"x")
-            pause.wait(0.02)
-        assert heard.samples == {}
-        assert list(one.info.peers_zid()) == []
