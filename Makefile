@@ -32,8 +32,9 @@ comma := ,
 demo: $(DEMO)/.ready
 	@$(DEMO)/bin/uavdepth demo --seconds $(DEMO_SECONDS) --output demo_out
 
+# The tests of a file stay in one process: they share worlds and recordings.
 test: $(DEV)/.ready
-	$(DEV)/bin/python -m pytest
+	$(DEV)/bin/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 lint: $(DEV)/.ready
 	$(DEV)/bin/ruff check .

@@ -9,11 +9,7 @@ from service.doctor.finding import Finding, Level
 from service.doctor.observation import Observation, Plan, Probe
 
 PLAN = Plan(wanted_hz={"ATTITUDE": 50.0, "LOCAL_POSITION_NED": 30.0, "DISTANCE_SENSOR": 20.0}, latency_s=0.1)
-
-
 GOOD_RATES = {"ATTITUDE": 49.4, "LOCAL_POSITION_NED": 28.7, "DISTANCE_SENSOR": 19.3}
-
-
 COPTER = Observation(
     endpoint="serial:/dev/ttyAMA0:921600",
     bytes_received=30_000,

@@ -18,20 +18,10 @@ from uavdepth.hints import Hints
 from uavdepth.scanner import ObstacleScanner
 
 SETTINGS = make_settings()
-
-
 CAMERA, MOUNT = SETTINGS.camera.model, SETTINGS.mount.mount
-
-
 AHEAD = 31
-
-
 MS = 1_000_000
-
-
 SECOND = 1_000_000_000
-
-
 FLYING = Telemetry(0, LEVEL, FLYING_HEIGHT_M, position_ned_m=(0.0, 0.0, -FLYING_HEIGHT_M))
 
 

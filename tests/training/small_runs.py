@@ -13,8 +13,6 @@ SMALL = NetworkShape(
     hint_channels=(4, 4, 4, 4, 4),
     correction_channels=4,
 )
-
-
 PHASES = (SizePhase(0.5, 64, 64, 2), SizePhase(1.0, 96, 64, 2))
 
 
