@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from training.sequences.kitti_odometry import KittiOdometrySequence
     from training.sequences.kitti_raw import KittiDrive
     from training.sequences.oxts import Oxts
+
+_Source = TypeVar("_Source", "KittiDrive", "KittiOdometrySequence")
 
 _PERIOD_NS = 103_500_000
 """KITTI's cameras make a picture in 0.1035 s, not in 0.1 s."""
@@ -50,28 +52,35 @@ def open_kitti(folder: Path) -> list[Journey]:
 
 
 @dataclass(frozen=True)
-class RawJourney:
-    """A drive of the raw data: attitude and speed from its oxts files."""
+class _KittiJourney(Generic[_Source]):
+    """What both kinds of data have in common: name and camera are those of the source."""
 
-    drive: KittiDrive
-    group: str = "kitti raw"
+    source: _Source
+    group: str
     mount: CameraMount = field(default_factory=CameraMount)
 
     @property
     def name(self) -> str:
-        """Date, drive and camera."""
-        return self.drive.name
+        """What it is called in the report."""
+        return self.source.name
 
     @property
     def camera(self) -> CameraModel:
         """Of the rectified pictures."""
-        return self.drive.camera
+        return self.source.camera
+
+
+@dataclass(frozen=True)
+class RawJourney(_KittiJourney["KittiDrive"]):
+    """A drive of the raw data: attitude and speed from its oxts files."""
+
+    group: str = "kitti raw"
 
     def moments(self) -> Iterator[Moment]:
         """Every picture that has a record of the motion."""
         position, before_ns = np.zeros(3), 0
-        for number, at_ns in enumerate(_exposures_ns(self.drive)):
-            oxts = self.drive.oxts(number)
+        for number, at_ns in enumerate(_exposures_ns(self.source)):
+            oxts = self.source.oxts(number)
             if oxts is None:
                 continue
             attitude, velocity = _flown(oxts)
@@ -79,30 +88,18 @@ class RawJourney:
             before_ns = at_ns
             said = (Said(at_ns, attitude, position, velocity),)
             speed = float(np.linalg.norm(velocity))
-            yield Moment(at_ns, self.drive.image_bgr(number), self.drive.truth_m(number), said, None, speed)
+            yield Moment(at_ns, self.source.image_bgr(number), self.source.truth_m(number), said, None, speed)
 
 
 @dataclass(frozen=True)
-class OdometryJourney:
+class OdometryJourney(_KittiJourney["KittiOdometrySequence"]):
     """A sequence of the odometry data: everything from its poses."""
 
-    sequence: KittiOdometrySequence
     group: str = "kitti odometry"
-    mount: CameraMount = field(default_factory=CameraMount)
-
-    @property
-    def name(self) -> str:
-        """Sequence and camera."""
-        return self.sequence.name
-
-    @property
-    def camera(self) -> CameraModel:
-        """Of the rectified pictures."""
-        return self.sequence.camera
 
     def moments(self) -> Iterator[Moment]:
         """Every picture."""
-        poses = [self.sequence.world_from_camera(number) for number in range(len(self.sequence))]
+        poses = [self.source.world_from_camera(number) for number in range(len(self.source))]
         # The first camera's axes are taken for the world's: north is where it looked.
         positions = np.array([BODY_FROM_CAMERA_AXES @ pose[:3, 3] for pose in poses])
         velocities = np.gradient(positions, _PERIOD_NS * 1e-9, axis=0)
@@ -111,8 +108,8 @@ class OdometryJourney:
             ned_from_body = BODY_FROM_CAMERA_AXES @ pose[:3, :3] @ BODY_FROM_CAMERA_AXES.T
             said = (Said(at_ns, _attitude(ned_from_body), positions[number], velocities[number]),)
             speed = float(np.linalg.norm(velocities[number]))
-            truth = self.sequence.truth_m(number)
-            yield Moment(at_ns, self.sequence.image_bgr(number), truth, said, None, speed)
+            truth = self.source.truth_m(number)
+            yield Moment(at_ns, self.source.image_bgr(number), truth, said, None, speed)
 
 
 def _exposures_ns(drive: KittiDrive) -> list[int]:
