@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import threading
+from contextlib import suppress
 from typing import NoReturn
 
 _STUCK = ("zenoh-", "camera", "side ", "perception", "recorder")
@@ -13,13 +14,16 @@ silent takes many seconds to close, as do a camera, a world to be rendered, a ne
 
 
 def end_process(code: int) -> NoReturn:
-    """End with `code`, at once where such a thread is still there.
+    """End with `code`, at once where such a thread is still there or Zenoh was used.
 
-    One that comes back from its library into an interpreter that is being taken down aborts the process
-    ("FATAL: exception not rethrown", "terminate called without an active exception", exit code 134).
+    A thread that comes back from its library into an interpreter that is being taken down aborts the process
+    ("FATAL: exception not rethrown", "terminate called without an active exception", exit code 134). Zenoh's
+    own threads, which Python does not know, do so now and then when they let go of what they called.
     """
-    if any(thread.name.startswith(_STUCK) for thread in threading.enumerate()):
-        sys.stdout.flush()
-        sys.stderr.flush()
+    is_stuck = any(thread.name.startswith(_STUCK) for thread in threading.enumerate())
+    if is_stuck or "zenoh" in sys.modules:
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError):  # nobody reads it any more
+                stream.flush()
         os._exit(code)
     sys.exit(code)

@@ -18,6 +18,7 @@ from service.clock import MonotonicClock
 from service.errors import PublisherError
 from service.frame import Frame
 from service.pipeline import PerceptionResult
+from service.process_end import end_process
 from service.publisher.publisher import ZenohPublisher
 from service.publisher.wire import ScanSample, StatusSample
 from service.settings.zenoh import ZenohSettings
@@ -133,3 +134,4 @@ def _fly(name: str, table: dict[str, Any], stop: Event, ready: Event, offered: S
             publisher.offer_status(status)
         number += 1
     publisher.close()
+    end_process(0)
