@@ -1,4 +1,4 @@
-"""The pictures that the benchmark measures with: a rendered street from a hovering vehicle."""
+"""The pictures that the benchmark measures with: a rendered street from a vehicle that flies along it."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ HEIGHT_M = 3.0
 CAMERA = CameraModel.from_fov(640, 320, 90.0)
 MOUNT = CameraMount(pitch_deg=-10.0)
 LEVEL = Attitude(0.0, 0.0, 0.0)
-_STEP_M = 1.5
+SPEED_MPS, FPS = 3.0, 15.0
 
 
 def render_pictures(count: int) -> list[NDArray[np.uint8]]:
-    """`count` pictures of (320, 640, 3) uint8 BGR on the way to the facade that ends the street."""
+    """`count` pictures of (320, 640, 3) uint8 BGR at `FPS`, on the way to the facade that ends the street."""
     scene = load_scene(SCENE, SEED)
     return [
-        scene.render(CAMERA, MOUNT, (_STEP_M * number, 0.0, -HEIGHT_M), LEVEL).image_bgr
+        scene.render(CAMERA, MOUNT, (SPEED_MPS * number / FPS, 0.0, -HEIGHT_M), LEVEL).image_bgr
         for number in range(count)
     ]
 

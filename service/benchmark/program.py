@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from service.benchmark.pictures import CAMERA, HEIGHT_M, MOUNT, write_pictures
+from service.benchmark.pictures import CAMERA, FPS, HEIGHT_M, MOUNT, write_pictures
 from service.clock import MonotonicClock
 from service.demo.companion import Companion
 from service.demo.observer import GroundObserver
@@ -22,7 +22,6 @@ from service.fake_autopilot.pilot import Pilot
 from uavdepth.errors import UavDepthError
 
 VEHICLE = "benchmark"
-FPS = 15.0
 _TIMEOUT_S = 30.0
 _POLL_S = 0.005
 

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from service.benchmark.pictures import CAMERA, HEIGHT_M, LEVEL, MOUNT
+from service.benchmark.pictures import CAMERA, FPS, HEIGHT_M, LEVEL, MOUNT, SPEED_MPS
 from service.frame import Frame
 from service.network import answers_in_metres, network_kind
 from service.pipeline import Perception
@@ -39,7 +39,8 @@ class StageTimes:
         network: inference alone.
         around_network: resize, normalise, depth of the output, to the camera's pixels.
         ground_scale, scan, message: the other steps of the flight path.
-        all_but_network: one whole step of the pipeline with the message, less inference.
+        after_sending: what of a picture only the next ones need; its distances do not wait for it.
+        all_but_network: one whole step of the pipeline with the message and what comes after, less inference.
         depth_png: the ground station's depth picture; made by the publisher, not on the flight path.
     """
 
@@ -48,6 +49,7 @@ class StageTimes:
     ground_scale: float
     scan: float
     message: float
+    after_sending: float
     all_but_network: float
     depth_png: float
 
@@ -94,8 +96,10 @@ def measure_stages(model_name: str, pictures: list[NDArray[np.uint8]]) -> StageT
     perception = Perception(settings, model, estimator, scanner, max_depth_m, loaded.card.hints)
     rows = []
     for number, picture in enumerate(pictures):
-        frame = Frame(picture, number, number)
-        telemetry = Telemetry(number, LEVEL, HEIGHT_M)
+        captured_ns = round(number / FPS * 1e9)
+        frame = Frame(picture, captured_ns, number)
+        place = (SPEED_MPS * number / FPS, 0.0, -HEIGHT_M)
+        telemetry = Telemetry(captured_ns, LEVEL, HEIGHT_M, place, (SPEED_MPS, 0.0, 0.0))
         depth, infer_ms = _timed(partial(model.infer, picture, CAMERA))
         network_ms = watch.last_ms
         depth_m = depth.depth_m
@@ -104,8 +108,10 @@ def measure_stages(model_name: str, pictures: list[NDArray[np.uint8]]) -> StageT
         _, message_ms = _timed(partial(encode_obstacle_distance, scan))
         _, step_ms = _timed(partial(perception.step, frame, telemetry))
         _, png_ms = _timed(partial(encode_depth_png, depth_m, _NEAR_M, _FAR_M))
-        rest_ms = step_ms - watch.last_ms + message_ms
-        rows.append((network_ms, infer_ms - network_ms, scale_ms, scan_ms, message_ms, rest_ms, png_ms))
+        step_network_ms = watch.last_ms
+        _, after_ms = _timed(perception.look_ahead)
+        around_ms, rest_ms = infer_ms - network_ms, step_ms - step_network_ms + message_ms + after_ms
+        rows.append((network_ms, around_ms, scale_ms, scan_ms, message_ms, after_ms, rest_ms, png_ms))
     return StageTimes(*(round(float(value), 2) for value in np.median(rows[_WARM_UP:], axis=0)))
 
 
