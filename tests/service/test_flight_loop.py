@@ -29,10 +29,18 @@ def fly(world: Scene, flavor: Flavor, *, seeing: bool = True, corridor: bool = F
     return fly_route(world, SMALL, flavor, eyes, NORTH, LATENCY_S, corridor=corridor)
 
 
+@pytest.fixture(scope="module")
+def seen(wall: Scene) -> dict[Flavor, Flown]:
+    """What comes of an approach with exact depth."""
+    return {"ardupilot": fly(wall, "ardupilot"), "px4": fly(wall, "px4")}
+
+
 class TestApproach:
     @pytest.mark.parametrize("flavor", ["ardupilot", "px4"])
-    def test_with_exact_depth_it_stops_before_the_wall(self, wall: Scene, flavor: Flavor) -> None:
-        flown = fly(wall, flavor)
+    def test_with_exact_depth_it_stops_before_the_wall(
+        self, seen: dict[Flavor, Flown], flavor: Flavor
+    ) -> None:
+        flown = seen[flavor]
         assert flown.outcome is Outcome.STOPPED
         assert flown.way_m > 6.0
         assert flown.ahead_m is not None
@@ -45,8 +53,8 @@ class TestApproach:
         assert flown.outcome is Outcome.TOUCHED
         assert flown.way_m == pytest.approx(NORTH.length_m, abs=0.8)
 
-    def test_two_flights_are_the_same_to_the_bit(self, wall: Scene) -> None:
-        assert fly(wall, "ardupilot") == fly(wall, "ardupilot")
+    def test_two_flights_are_the_same_to_the_bit(self, wall: Scene, seen: dict[Flavor, Flown]) -> None:
+        assert fly(wall, "ardupilot") == seen["ardupilot"]
 
 
 class TestCorridor:
