@@ -32,6 +32,10 @@ _BASELINE_SIGMAS = 3.0
 _LEAST_TRACKS_OF_TURN = 30
 """Fewer do not tell how far a picture turned."""
 
+_MEASURED_EVERY_NS = 90_000_000
+"""Of pictures that follow each other faster not every one is measured: the same corners from hardly another
+place say hardly anything new."""
+
 _MOST_VIEWS = 4
 """Besides the newest; more of them, spread over the same time, add work but hardly any certainty."""
 
@@ -101,6 +105,7 @@ class MotionPoints:
         self._last = _no_points()
         self._is_behind = False
         self._unmeasured: VehicleMotion | None = None
+        self._measured_ns: int | None = None
 
     @property
     def suspicion(self) -> str | None:
@@ -113,7 +118,7 @@ class MotionPoints:
         self._times.clear()
         self._carried.clear()
         self._last = _no_points()
-        self._is_behind, self._unmeasured = False, None
+        self._is_behind, self._unmeasured, self._measured_ns = False, None, None
 
     def update(self, image_bgr: NDArray[np.uint8], captured_ns: int, motion: VehicleMotion) -> PointHints:
         """Points of one picture.
@@ -153,16 +158,18 @@ class MotionPoints:
     def measure(self) -> None:
         """What only later pictures need: the depth of the newest picture's points, and new corners.
 
-        The next `update` begins with it where it was not called.
+        The next `update` begins with it where it was not called. Depth is measured 11 times a second at most.
         """
         if not self._is_behind:
             return
         self._is_behind = False
         motion, self._unmeasured = self._unmeasured, None
-        if motion is not None and len(self._tracks.ids):
-            captured_ns = self._times[-1]
+        captured_ns = self._times[-1]
+        is_due = self._measured_ns is None or captured_ns - self._measured_ns >= _MEASURED_EVERY_NS
+        if motion is not None and is_due and len(self._tracks.ids):
             views = self._views(captured_ns, motion)
             if views:
+                self._measured_ns = captured_ns
                 self._measure(captured_ns, motion, views)
         self._tracks.renew()
 

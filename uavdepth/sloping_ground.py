@@ -124,12 +124,12 @@ class SlopingGround:
             wanted &= (range_m >= _NEAREST_M) & (range_m < self._max_distance_m)
         index = np.flatnonzero(wanted)
         element = _element(points[0, index], points[1, index])
-        key = (element * self._cells + _cell(range_m[index], self._cells)) * _LEVELS
+        seen = np.bincount(element, minlength=SECTOR_COUNT) > 0
+        row = (np.cumsum(seen) - 1)[element]
+        key = (row * self._cells + _cell(range_m[index], self._cells)) * _LEVELS
         key += level[index].astype(np.intp)
-        shape = (SECTOR_COUNT, self._cells, _LEVELS)
-        count = np.bincount(key, minlength=math.prod(shape)).reshape(shape)
-        rows = np.flatnonzero(count.any(axis=(1, 2)))
-        return count[rows], rows
+        shape = (int(np.count_nonzero(seen)), self._cells, _LEVELS)
+        return np.bincount(key, minlength=math.prod(shape)).reshape(shape), np.flatnonzero(seen)
 
     def _followed(self, count: NDArray[np.int64], height_m: float) -> NDArray[np.float64]:
         """(rows, cells) rise of the ground over the foot, NaN where it does not go on."""
