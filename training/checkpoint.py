@@ -112,6 +112,11 @@ class Checkpoint:
         return network.eval()
 
 
+def is_checkpoint_of(path: Path, format: str) -> bool:
+    """Whether a checkpoint is of another kind of run, by its format. Raises CheckpointError: it is none."""
+    return bool(_read(path).get("format") == format)
+
+
 def read_weights(path: Path) -> dict[str, Tensor]:
     """Averaged weights of a checkpoint of any format. Raises CheckpointError."""
     average = _read(path).get("average")

@@ -20,6 +20,7 @@ from training.train_command import train
 if TYPE_CHECKING:
     from training.checkpoint import Checkpoint
     from training.doubt_calibration import DoubtCalibration
+    from uavdepth.model_card import ModelCard
 
 __all__ = ["evaluate", "export", "train"]
 
@@ -31,7 +32,9 @@ _CALIBRATION_FRAMES = 12
 
 def export(
     output: Annotated[Path, typer.Argument(help="ONNX file to write.")],
-    checkpoint: Annotated[Path, typer.Option(help="Checkpoint of `uavdepth train`.")] = DEFAULT_CHECKPOINT,
+    checkpoint: Annotated[
+        Path, typer.Option(help="Checkpoint of `uavdepth train` or of `uavdepth train-video`.")
+    ] = DEFAULT_CHECKPOINT,
     name: Annotated[str, typer.Option(help="Name of the network, for status and records.")] = DEFAULT_NAME,
     measured: Annotated[
         Path | None,
@@ -52,20 +55,39 @@ def export(
 ) -> None:
     """Write a trained network as ONNX with its card.
 
-    The file is checked against PyTorch before it takes its place.
+    The file is checked against PyTorch before it takes its place. A network that video has taught becomes a
+    relative one: the service finds its metres.
     """
     with needs_extra("export", "train"):
-        from training.checkpoint import Checkpoint
+        from training.checkpoint import Checkpoint, is_checkpoint_of
         from training.export import export_checkpoint
+        from training.selfsupervised.run_state import FORMAT as FROM_VIDEO
 
+    wanted = _parsed_size(size)
+    if is_checkpoint_of(checkpoint, FROM_VIDEO):
+        if calibrate is not None or measured is not None:
+            raise ExportError(f"{checkpoint} is of train-video: --calibrate and --measured are not for it")
+        _tell(_export_video(checkpoint, output, name, wanted), output)
+        return
     errors = _measured_errors(measured) if measured is not None else {}
-    run, wanted = Checkpoint.load(checkpoint), _parsed_size(size)
+    run = Checkpoint.load(checkpoint)
     factor = 1.0
     if calibrate is not None:
         found = _calibrated(run, wanted, name, calibrate, calibration_seeds)
         errors["sigma_calibration"], factor = found.as_json(), found.factor
         typer.echo(f"sigma is multiplied by {factor:.3f}, from {found.frames} frames of {found.data}")
-    card = export_checkpoint(run, output, name, errors, wanted, factor)
+    _tell(export_checkpoint(run, output, name, errors, wanted, factor), output)
+
+
+def _export_video(checkpoint: Path, output: Path, name: str, size: tuple[int, int] | None) -> ModelCard:
+    from training.selfsupervised.export import export_run
+    from training.selfsupervised.run_state import RunState
+
+    state = RunState.load(checkpoint)
+    return export_run(state, output, state.settings.network.name if name == DEFAULT_NAME else name, size)
+
+
+def _tell(card: ModelCard, output: Path) -> None:
     typer.echo(
         f"{output}: {card.name}, {card.input_width}x{card.input_height}, "
         f"{output.stat().st_size / 1e6:.1f} MB, checked against PyTorch"

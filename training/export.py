@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import logging
 import math
-import warnings
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from itertools import product
 from pathlib import Path
-from typing import Any, cast
 
 import numpy as np
 import onnx
@@ -24,11 +20,9 @@ from training.errors import ExportError
 from training.half_weights import rounded_network, store_in_half
 from training.networks.depth_network import DepthNetwork
 from training.normalization import FOCAL_REFERENCE_PX, IMAGE_MEAN, IMAGE_STD, MAX_DEPTH_M
+from training.onnx_file import trace, write_checked
 from uavdepth.depth_model import DepthModel
-from uavdepth.model_card import CARD_METADATA_KEY, ModelCard
-
-OPSET = 18
-"""The first with the Pad and ReduceMean that PyTorch writes; ONNX Runtime knows it since 1.14 (2023)."""
+from uavdepth.model_card import ModelCard
 
 LARGEST_DIFFERENCE = 1e-3
 """Of log inverse depth between PyTorch and ONNX Runtime: 0.1 % of depth."""
@@ -102,16 +96,7 @@ def export_checkpoint(
     network = _TwoOutputs(rounded_network(checkpoint.averaged_network()), sigma_factor).eval()
     model = _to_onnx(network, card)
     store_in_half(model)
-    onnx.checker.check_model(model)
-    onnx.helper.set_model_props(model, {CARD_METADATA_KEY: card.to_json()})
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.name}.part.onnx")
-    try:
-        partial.write_bytes(model.SerializeToString())
-        _check_same_output(network, partial)
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    write_checked(model, card, path, lambda file: _check_same_output(network, file))
     return card
 
 
@@ -152,44 +137,8 @@ def make_card(
 
 def _to_onnx(network: _TwoOutputs, card: ModelCard) -> onnx.ModelProto:
     inputs = tuple(torch.zeros(1, channels, card.input_height, card.input_width) for channels in (3, 1, 2))
-    with torch.no_grad(), _quiet_exporter():
-        program = torch.onnx.export(
-            network,
-            inputs,
-            input_names=[card.input_name, card.ground_name, card.points_name],
-            output_names=[card.output_name, card.uncertainty_name],
-            opset_version=OPSET,
-            dynamo=True,
-            verbose=False,
-        )
-    model = cast(onnx.ModelProto, cast(Any, program).model_proto)
-    _strip_traces(model)
-    return model
-
-
-@contextmanager
-def _quiet_exporter() -> Iterator[None]:
-    """The exporter warns about packages that are not needed and about its own deprecations."""
-    logger = logging.getLogger("torch.onnx")
-    level = logger.level
-    logger.setLevel(logging.ERROR)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    finally:
-        logger.setLevel(level)
-
-
-def _strip_traces(model: onnx.ModelProto) -> None:
-    """Take out the source lines, with this machine's paths, that PyTorch notes at every node."""
-    del model.metadata_props[:]
-    del model.graph.metadata_props[:]
-    model.doc_string = model.graph.doc_string = ""
-    graph = model.graph
-    for item in (*graph.node, *graph.initializer, *graph.value_info, *graph.input, *graph.output):
-        del item.metadata_props[:]
-        item.doc_string = ""
+    names = (card.input_name, card.ground_name, card.points_name)
+    return trace(network, inputs, names, (card.output_name, card.uncertainty_name))
 
 
 def _check_same_output(network: _TwoOutputs, path: Path) -> None:
