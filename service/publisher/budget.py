@@ -31,12 +31,13 @@ are to be 150 ms late at most."""
 _LOW_NS: Final = 40_000_000
 """Waiting below which the budget grows."""
 
-_FIRST_GROWTH: Final = 0.3
+_FIRST_GROWTH: Final = 0.2
 """With each report, before pictures have ever waited."""
 
-_FIRST_PROOF: Final = 2.0
-"""The budget grows so fast only up to this many times what has arrived: small pictures prove nothing about
-large ones (RFC 7661)."""
+_FIRST_PROOF: Final = 4.0
+"""The budget grows so fast only up to this many times what has arrived in the time of a report (few and small
+pictures prove nothing about more and larger ones, RFC 7661), or up to the rate of the newest picture, which
+cannot have come faster than the slowest part of the link takes bytes."""
 
 _GROWTH: Final = 0.06
 """With each report after that."""
@@ -80,7 +81,7 @@ class PictureBudget:
         """From publishing to the report of it, by the newest report."""
         self._too_much: float | None = None
         self._has_waited = False
-        self._sent: OrderedDict[tuple[str, int], int] = OrderedDict()
+        self._sent: OrderedDict[tuple[str, int], tuple[int, int]] = OrderedDict()
         self._first_sent_ns: int | None = None
         self._last_sent_ns: int | None = None
         self._last_report_ns: int | None = None
@@ -101,7 +102,7 @@ class PictureBudget:
         self._flying_bytes += size_bytes
         while len(self._flying) > _MAX_SENT:
             self._flying_bytes -= self._flying.popleft()[1]
-        self._sent[topic, index] = now_ns
+        self._sent[topic, index] = now_ns, size_bytes
         while len(self._sent) > _MAX_SENT:
             self._sent.popitem(last=False)
         self._last_sent_ns = now_ns
@@ -116,9 +117,10 @@ class PictureBudget:
             now_ns: when it came, on the vehicle's clock.
             wants_more: pictures are smaller or fewer than they should be.
         """
-        sent_ns = self._sent.get((report.topic, report.index))
-        if sent_ns is None:
+        sent = self._sent.get((report.topic, report.index))
+        if sent is None:
             return
+        sent_ns, size_bytes = sent
         waits = self._stations.setdefault(report.station, deque(maxlen=_STANDING))
         self._stations.move_to_end(report.station)
         while len(self._stations) > _MAX_STATIONS:
@@ -138,11 +140,12 @@ class PictureBudget:
             self._set(_RETREAT * self._too_much)
         elif waits[-1] < _LOW_NS and wants_more:
             # Each of several stations reports: together they must not grow faster than one.
-            self._set(self.bytes_per_s * (1 + self._growth(arrived, now_ns) / len(self._stations)))
+            proven = max(_FIRST_PROOF * arrived, 1e9 * size_bytes / max(delay_ns, 1_000_000))
+            self._set(self.bytes_per_s * (1 + self._growth(proven, now_ns) / len(self._stations)))
 
-    def _growth(self, arrived_bytes_per_s: float, now_ns: int) -> float:
+    def _growth(self, proven_bytes_per_s: float, now_ns: int) -> float:
         if self._too_much is None or self._shrunk_ns is None:
-            proven = _FIRST_PROOF * arrived_bytes_per_s / self.bytes_per_s - 1
+            proven = proven_bytes_per_s / self.bytes_per_s - 1
             return _GROWTH if self._has_waited else min(max(proven, _GROWTH), _FIRST_GROWTH)
         if not _NEAR * self._too_much < self.bytes_per_s < _FAR * self._too_much:
             return _GROWTH
