@@ -12,83 +12,17 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from link_support import SECOND_NS as S
-from link_support import TICK_NS, Voice, clear_scan, message_id
-from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from link_support import Voice, message_id
+from signing_support import KEY, OTHER_KEY, SECOND, YEARS, Link, Listener, SignedVoice, stamp_of, written
 
 from service.autopilot.link import AutopilotLink
-from service.autopilot.link_status import LinkStatus
-from service.autopilot.session import LinkSession
 from service.autopilot.signing import LINK_ID, Signing, Verdict
-from service.autopilot.signing_key import SigningKey, load_signing_key
+from service.autopilot.signing_key import SigningKey
 from service.clock import MonotonicClock
-from service.errors import LinkError
 from service.settings.autopilot import AutopilotSettings
 
-KEY, OTHER_KEY = SigningKey(bytes(range(32))), SigningKey(bytes(range(1, 33)))
-YEARS = 11 * 365 * 24 * 3600 * 100_000
-"""A time stamp of these years: 10 microseconds since 2015."""
-SECOND = 100_000
 PATIENCE_S = 20.0
 """How long a test waits for what must come; nothing is asserted of how soon it does."""
-
-
-class SignedVoice(Voice):
-    """An autopilot whose packets pymavlink signs."""
-
-    def __init__(
-        self, key: SigningKey = KEY, stamp: int = YEARS, link_id: int = 0, component_id: int = 1
-    ) -> None:
-        super().__init__(1, component_id)
-        self.signing = self._codec.signing
-        self.signing.secret_key, self.signing.timestamp = key.secret, stamp
-        self.signing.link_id, self.signing.sign_outgoing = link_id, True
-
-
-class Listener:
-    """A MAVLink party that, like an autopilot, takes only packets signed with the key; pymavlink's check."""
-
-    def __init__(self, key: SigningKey = KEY, stamp: int = YEARS) -> None:
-        self.codec = mavlink.MAVLink(None)
-        self.codec.signing.secret_key, self.codec.signing.timestamp = key.secret, stamp
-
-    def takes(self, frame: bytes) -> bool:
-        try:
-            self.codec.decode(bytearray(frame))
-        except mavlink.MAVError:
-            return False
-        return True
-
-
-class Link:
-    """A session with a key, and the frames that leave."""
-
-    def __init__(self, key: SigningKey | None = KEY) -> None:
-        self.session = LinkSession(AutopilotSettings(), key)
-        self.now_ns = S
-        self.session.line_opened(S)
-
-    def hear(self, frame: bytes) -> None:
-        self.session.receive(frame, self.now_ns)
-
-    def speak(self, seconds: float = 0.02) -> list[bytes]:
-        frames, end_ns = [], self.now_ns + round(seconds * S)
-        while self.now_ns < end_ns:
-            self.now_ns += TICK_NS
-            self.session.tick(self.now_ns)
-            frames += self.session.take_output(self.now_ns)
-        return frames
-
-    def send_obstacles(self) -> bool:
-        return self.session.send_obstacles(clear_scan(), self.now_ns, self.now_ns)
-
-    @property
-    def status(self) -> LinkStatus:
-        return self.session.status(self.now_ns)
-
-
-def stamp_of(frame: bytes) -> int:
-    return int.from_bytes(frame[-12:-6], "little")
 
 
 def test_an_autopilot_with_the_key_is_heard_and_takes_every_packet_of_ours() -> None:
@@ -252,66 +186,3 @@ def test_over_a_socket_a_signing_autopilot_and_the_link_believe_each_other(tmp_p
         assert link.status().connected
         assert link.status().signed
     assert all(autopilot.takes(frame) for frame in frames)
-
-
-class TestKeyFile:
-    def test_32_bytes_are_the_key(self, tmp_path: Path) -> None:
-        path = written(tmp_path, KEY.secret)
-        assert load_signing_key(path) == KEY
-
-    @pytest.mark.parametrize("text", [b"passphrase: correct horse\n", b"passphrase:correct horse"])
-    def test_a_passphrase_is_hashed_as_ground_stations_do(self, tmp_path: Path, text: bytes) -> None:
-        assert load_signing_key(written(tmp_path, text)).secret == hashlib.sha256(b"correct horse").digest()
-
-    @pytest.mark.parametrize(
-        ("data", "text"),
-        [
-            (b"", "holds 0 bytes: exactly 32"),
-            (b"x" * 31, "holds 31 bytes"),
-            (b"x" * 32 + b"\n", "holds 33 bytes"),
-            (b"x" * 5000, "more than 4096 bytes"),
-            (bytes(32), "is all zero"),
-            (b"passphrase:  \n", "the passphrase is empty"),
-            (b"passphrase: a\nb\n", "more than one line"),
-        ],
-    )
-    def test_another_file_is_refused_with_its_name(self, tmp_path: Path, data: bytes, text: str) -> None:
-        path = written(tmp_path, data)
-        with pytest.raises(LinkError, match=text) as refusal:
-            load_signing_key(path)
-        assert str(path) in str(refusal.value)
-
-    def test_a_missing_file_and_a_folder_are_refused(self, tmp_path: Path) -> None:
-        with pytest.raises(LinkError, match="no such file"):
-            load_signing_key(tmp_path / "key")
-        with pytest.raises(LinkError, match="cannot be read"):
-            load_signing_key(tmp_path)
-
-    @pytest.mark.parametrize(
-        ("mode", "warned"), [(0o600, False), (0o400, False), (0o640, True), (0o644, True)]
-    )
-    def test_a_key_that_others_can_read_is_warned_about(
-        self, tmp_path: Path, mode: int, warned: bool
-    ) -> None:
-        path = written(tmp_path, KEY.secret)
-        path.chmod(mode)
-        warning = load_signing_key(path).warning
-        assert (warning is not None) is warned
-        assert warning is None or "chmod 600" in warning
-
-    def test_the_key_is_never_shown(self) -> None:
-        assert "secret" not in repr(KEY)
-
-    def test_a_link_with_a_wrong_key_file_does_not_start(self, tmp_path: Path) -> None:
-        settings = AutopilotSettings(endpoint="udp:127.0.0.1:0", signing_key_file=str(tmp_path / "key"))
-        link = AutopilotLink(settings, MonotonicClock())
-        with pytest.raises(LinkError, match="no such file"):
-            link.start()
-        link.close()
-
-
-def written(folder: Path, data: bytes) -> Path:
-    path = folder / "signing.key"
-    path.write_bytes(data)
-    path.chmod(0o600)
-    return path

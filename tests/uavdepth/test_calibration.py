@@ -2,39 +2,21 @@
 
 from __future__ import annotations
 
-import struct
-
 import cv2
 import numpy as np
 import pytest
-from board_pictures import board_picture, board_pose, varied_pictures
+from calibrated_views import CHARUCO, CHESSBOARD, SIZE, TRUE, ideal_views, seen
 from hypothesis import given
 from hypothesis import strategies as st
 
 from uavdepth.calibration.advice import advise, horizontal_fov_deg
-from uavdepth.calibration.board import Board, parse_board
 from uavdepth.calibration.coverage import cover
-from uavdepth.calibration.detection import BoardDetector, Refusal, View, other_board
+from uavdepth.calibration.detection import View
 from uavdepth.calibration.picture import draw_coverage
-from uavdepth.calibration.print_board import board_png
 from uavdepth.calibration.selection import choose_views
 from uavdepth.calibration.solve import Calibration, Distortion, solve
 from uavdepth.camera import CameraModel
 from uavdepth.errors import CalibrationError
-
-SIZE = (640, 480)
-TRUE = CameraModel(*SIZE, 480.0, 482.0, 325.5, 236.0, (-0.22, 0.08, 0.0008, -0.0006, 0.0))
-CHESSBOARD = parse_board("chessboard:9x6:25mm")
-CHARUCO = parse_board("charuco:9x7:30mm:22mm")
-
-
-def seen(board: Board, camera: CameraModel, count: int) -> list[View]:
-    detector = BoardDetector(board)
-    found = [
-        detector.detect(picture, f"{number}.png")
-        for number, picture in enumerate(varied_pictures(board, camera, count))
-    ]
-    return [view for view in found if isinstance(view, View)]
 
 
 @pytest.fixture(scope="module")
@@ -45,33 +27,6 @@ def charuco_views() -> list[View]:
 @pytest.fixture(scope="module")
 def charuco_calibration(charuco_views: list[View]) -> Calibration:
     return solve(charuco_views, SIZE, CHARUCO)
-
-
-def ideal_views(
-    camera: CameraModel,
-    board: Board,
-    count: int,
-    noise_px: float = 0.05,
-    tilt: float = 30.0,
-    seed: int = 3,
-    reach: float = 0.3,
-) -> list[View]:
-    """Corners as a camera projects them, without pictures."""
-    rng = np.random.default_rng(seed)
-    views = []
-    for number in range(count):
-        at = (0.5 + rng.uniform(-reach, reach), 0.5 + rng.uniform(-reach, reach))
-        tilts = (rng.uniform(-tilt, tilt), rng.uniform(-tilt, tilt))
-        distance_m = rng.uniform(1.0, 1.6) * board.size_m[0] * camera.fx / camera.width * 1.8
-        turn, shift = board_pose(board, camera, at, distance_m, tilts, rng.uniform(-20, 20))
-        points = board.corners_m.astype(float) + np.array([board.square_m, board.square_m, 0])
-        pixels, _ = cv2.projectPoints(
-            points, cv2.Rodrigues(turn)[0], shift, camera.matrix, np.array(camera.distortion)
-        )
-        noisy = pixels.reshape(-1, 2) + rng.normal(0, noise_px, (len(points), 2))
-        inside = ((noisy > 0) & (noisy < np.array(SIZE) - 1)).all(axis=1)
-        views.append(View(f"{number}.png", np.flatnonzero(inside), noisy[inside].astype(np.float32), 1.5))
-    return views
 
 
 def worst_corner_px(found: CameraModel, true: CameraModel) -> float:
@@ -136,63 +91,6 @@ def test_a_picture_that_contradicts_the_others_is_named_and_left_out():
 def test_too_few_pictures_are_an_error_that_says_how_many():
     with pytest.raises(CalibrationError, match=r"3 pictures .* at least 4"):
         solve(ideal_views(TRUE, CHESSBOARD, 3), SIZE, CHESSBOARD)
-
-
-# What a picture is refused for.
-
-
-def near_picture(board: Board = CHARUCO) -> np.ndarray:
-    pose = board_pose(board, TRUE, (0.5, 0.5), board.size_m[0] * 1.2, (15.0, 20.0))
-    return board_picture(board, TRUE, *pose)
-
-
-@pytest.mark.parametrize("board", [CHARUCO, CHESSBOARD])
-def test_a_sharp_picture_is_taken_and_a_blurred_one_is_refused_as_blurred(board):
-    detector = BoardDetector(board)
-    sharp = near_picture(board)
-    view = detector.detect(sharp, "sharp")
-    assert isinstance(view, View)
-    assert 1 <= view.edge_width_px < 2
-    answer = detector.detect(cv2.GaussianBlur(sharp, (0, 0), 2.4), "soft")
-    assert isinstance(answer, Refusal)
-    assert answer.name == "soft"
-    assert "blurred" in answer.reason
-
-
-def test_motion_along_one_axis_counts_as_blur():
-    moved = BoardDetector(CHESSBOARD).detect(cv2.blur(near_picture(CHESSBOARD), (9, 1)), "moved")
-    assert isinstance(moved, Refusal)
-    assert "blurred" in moved.reason
-
-
-@pytest.mark.parametrize("board", [CHARUCO, CHESSBOARD])
-def test_an_empty_picture_shows_no_board(board):
-    answer = BoardDetector(board).detect(np.full((480, 640, 3), 127, np.uint8), "empty")
-    assert isinstance(answer, Refusal)
-    assert "no board" in answer.reason
-
-
-def test_a_board_of_another_size_is_told_by_what_is_there():
-    picture = near_picture(CHESSBOARD)
-    wrong = parse_board("chessboard:8x5:25mm")
-    assert isinstance(BoardDetector(wrong).detect(picture, "p"), Refusal)
-    assert other_board(wrong, picture) == "a chessboard with 9x6 inner corners"
-    assert other_board(CHESSBOARD, picture) is None
-
-
-def test_markers_that_the_board_does_not_have_are_told():
-    assert "markers 0 to 16" in str(other_board(parse_board("charuco:7x5:30mm:22mm"), near_picture()))
-
-
-def test_a_part_of_a_charuco_board_is_enough():
-    picture = near_picture()
-    picture[:, :300] = 100
-    view = BoardDetector(CHARUCO).detect(picture, "half")
-    assert isinstance(view, View)
-    assert 8 <= len(view.ids) < len(CHARUCO.corners_m)
-
-
-# What advice is given.
 
 
 def texts(views: list[View], model: Distortion = Distortion.BROWN5) -> str:
@@ -267,9 +165,6 @@ def test_a_distortion_that_folds_the_picture_is_serious():
     assert any(remark.serious and "cannot be undone" in remark.text for remark in remarks)
 
 
-# Which pictures are chosen.
-
-
 def test_of_many_alike_pictures_only_different_ones_are_chosen():
     base = ideal_views(TRUE, CHESSBOARD, 6, 0.0)
     many = [view for view in base for _ in range(5)]
@@ -284,52 +179,3 @@ def test_never_more_pictures_are_chosen_than_asked_for_and_their_order_is_kept(a
     chosen = choose_views(views, SIZE, CHESSBOARD, at_most)
     assert len(chosen) <= at_most
     assert [view for view in views if any(view is each for each in chosen)] == list(chosen)
-
-
-# The board.
-
-
-@given(st.integers(3, 20), st.integers(3, 20), st.integers(2, 500))
-def test_a_chessboard_is_read_as_it_is_written(columns, rows, side_mm):
-    board = parse_board(f"chessboard:{columns}x{rows}:{side_mm}mm")
-    assert board.inner == (columns, rows)
-    assert board.square_m == pytest.approx(side_mm / 1000)
-    assert len(board.corners_m) == columns * rows
-
-
-@pytest.mark.parametrize(
-    ("text", "part"),
-    [
-        ("chessboard", "chessboard:COLUMNSxROWS:SIDE"),
-        ("chessboard:9-6:25mm", "no size"),
-        ("chessboard:9x6:25", "no length"),
-        ("chessboard:9x1:25mm", "2 rows"),
-        ("chessboard:9x6:1mm", "1 mm"),
-        ("charuco:7x5:30mm", "charuco:COLUMNSxROWS"),
-        ("charuco:7x5:30mm:31mm", "do not fit"),
-        ("charuco:7x5:30mm:22mm:9X9_1", "no dictionary 9X9_1"),
-        ("charuco:20x20:30mm:22mm:4X4_50", "200 markers are needed"),
-    ],
-)
-def test_a_board_that_cannot_be_is_refused_with_the_reason(text, part):
-    with pytest.raises(CalibrationError, match=part):
-        parse_board(text)
-
-
-@pytest.mark.parametrize(
-    "text", ["chessboard:6x4:20mm", "charuco:5x4:31mm:20mm", "charuco-legacy:5x4:3cm:2cm"]
-)
-def test_the_printed_board_has_its_true_size_and_is_found(text):
-    board = parse_board(text)
-    data = board_png(board)
-    page = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE)
-    at = data.index(b"pHYs")
-    per_m, per_m_y, unit = struct.unpack(">IIB", data[at + 4 : at + 13])
-    assert (per_m, unit) == (per_m_y, 1)
-    assert data.count(b"pHYs") == 1
-    assert page.shape[1] / per_m == pytest.approx((board.columns + 2) * board.square_m, rel=1e-4)
-    view = BoardDetector(board).detect(page, "page")
-    assert isinstance(view, View)
-    assert len(view.ids) == len(board.corners_m)
-    sides = np.ptp(view.pixels, axis=0) / per_m / board.square_m
-    assert sorted(sides) == pytest.approx(sorted(side - 1 for side in board.inner), rel=1e-3)
