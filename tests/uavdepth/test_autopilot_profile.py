@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -30,6 +31,7 @@ def apart_deg(a: float, b: float) -> float:
     return abs((a - b + 180.0) % 360.0 - 180.0)
 
 
+@cache
 def touching(profile: AutopilotProfile, element: int) -> list[int]:
     """The scan's sectors that share an angle with an element, by the definition."""
     centre = profile.first_bearing_deg + element * profile.increment_deg
