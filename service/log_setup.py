@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import logging
 import sys
+from contextlib import suppress
+from typing import TextIO, cast
 
 import structlog
 
@@ -31,7 +34,7 @@ def set_up_logging(settings: LogSettings) -> None:
     structlog.configure(
         processors=processors,
         wrapper_class=structlog.make_filtering_bound_logger(level),
-        logger_factory=structlog.PrintLoggerFactory(sys.stderr),
+        logger_factory=structlog.PrintLoggerFactory(cast(TextIO, _LastingStream(sys.stderr))),
         cache_logger_on_first_use=True,
     )
 
@@ -42,6 +45,24 @@ def log_to_standard_error() -> None:
     structlog.configure(
         logger_factory=lambda *_arguments: structlog.PrintLogger(sys.stderr), cache_logger_on_first_use=False
     )
+
+
+class _LastingStream(io.TextIOBase):
+    """A stream that may go away: no thread ends because nobody reads what it says."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """Write, or not."""
+        with suppress(OSError, ValueError):
+            self._stream.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        """Hand on, or not."""
+        with suppress(OSError, ValueError):
+            self._stream.flush()
 
 
 def _exception_in_words(

@@ -106,12 +106,12 @@ class ScanThread:
                     if self._clock.now_ns() >= look_due_ns:
                         look_due_ns = self._clock.now_ns() + _PEERS_PERIOD_NS
                         self._look()
+                    self.on_turn()
                 except Exception as error:
                     # Whatever breaks here, the vehicle's obstacles go on; the sessions are opened anew.
                     log.exception("zenoh publisher broke")
                     self._drop(f"zenoh: {type(error).__name__}: {error}")
                     self._stopping.wait(_TAKE_S)
-                self.on_turn()
         finally:
             self._listening(None)
             for line in self._lines:

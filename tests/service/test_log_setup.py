@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Iterator
 
 import pytest
 import structlog
 
-from service.log_setup import log_to_standard_error
+from service.log_setup import log_to_standard_error, set_up_logging
+from service.settings.log import LogSettings
 
 
 @pytest.fixture(autouse=True)
@@ -28,3 +31,15 @@ def test_what_is_logged_does_not_stand_in_a_result(capsys: pytest.CaptureFixture
     assert "second" not in printed.out
     assert "second" in printed.err
     assert "number" in printed.err
+
+
+def test_nobody_who_logs_ends_because_nobody_reads_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    stream = os.fdopen(writing, "w", buffering=1)
+    monkeypatch.setattr(sys, "stderr", stream)
+    set_up_logging(LogSettings())
+    structlog.get_logger().warning("zenoh", problem="no peer")
+    structlog.get_logger().warning("zenoh", problem="no peer")
+    with pytest.raises(BrokenPipeError):
+        stream.close()
