@@ -15,6 +15,7 @@ from service.cameras.reader import CameraReader, CameraState
 from service.cameras.source import make_camera
 from service.clock import Clock, MonotonicClock
 from service.frame import Frame
+from service.fresh_frames import FreshFrames
 from service.health import SEVERITY_WARNING
 from service.hold_on_loss import HoldOnLoss
 from service.latency_advice import advise
@@ -78,12 +79,12 @@ class Service:
             tap = None if self._recorder is None else self._recorder.offer_packets
             link = AutopilotLink(settings.autopilot, self._clock, tap)
         self._link: Link = link
-        self._frames: LatestSlot[Frame] = LatestSlot()
+        self._frames = FreshFrames(self._clock, settings.camera)
         if camera is None:
             camera = make_camera(
                 settings.camera.source, settings.camera, self._clock, self._link, settings.mount.mount
             )
-        self._reader = CameraReader(camera, self._frames)
+        self._reader = CameraReader(camera, self._frames.slot)
         record = None if self._recorder is None else self._recorder.offer
         self._sides = SideCameras(settings, self._clock, self._link, record=record)
         self._publisher: ZenohPublisher | None = None
