@@ -35,7 +35,7 @@ def router(
     import structlog
 
     from service.log_setup import set_up_logging
-    from service.publisher.session import Role, open_session
+    from service.publisher.session import station_session
     from service.security.errors import SecurityError
     from service.settings.log import LogSettings
 
@@ -48,7 +48,7 @@ def router(
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda _number, _frame: stop.set())
-    with open_session(settings.listen, settings.connect, settings.security, Role.STATION) as session:
+    with station_session(settings.listen, settings.connect, settings.security) as session:
         log.info("router", listens_at=", ".join(settings.listen), connects_to=", ".join(settings.connect))
         known = -1
         while not stop.is_set():

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from service.clock import Clock
 from service.publisher import keys
 from service.publisher.picture_receiver import PictureReceiver
-from service.publisher.session import Role, open_session
+from service.publisher.session import station_session
 from service.publisher.wire import DepthHeader, ScanSample, StatusSample, WireError
 from service.watch.board import Board, VehicleView
 from service.watch.listener import Listener
@@ -61,7 +61,7 @@ class GroundObserver:
         self._depth: tuple[bytes, bytes] | None = None
         with ExitStack() as stack:
             stack.enter_context(Listener([connect], self.board, clock))
-            session = stack.enter_context(open_session((), (connect,), None, Role.STATION))
+            session = stack.enter_context(station_session((), (connect,)))
             stack.callback(PictureReceiver(session, vehicle, self._take_picture, clock).close)
             self._sessions = stack.pop_all()
 

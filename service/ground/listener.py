@@ -12,7 +12,7 @@ import zenoh
 from service.clock import Clock
 from service.ground.fleet import Fleet
 from service.publisher.picture_receiver import PictureReceiver
-from service.publisher.session import Role, open_session
+from service.publisher.session import station_session
 from service.publisher.vehicle_samples import hear_vehicles
 from service.security.security import Security
 
@@ -48,10 +48,10 @@ class FleetListener:
         self._lock = threading.Lock()
         self._receivers: dict[str, list[PictureReceiver]] = {}
         with ExitStack() as stack:
-            self._session = stack.enter_context(open_session(listen, connect, security, Role.STATION))
+            self._session = stack.enter_context(station_session(listen, connect, security))
             self._picture_sessions: list[zenoh.Session] = [self._session] if listen else []
             if connect:
-                own = stack.enter_context(open_session([], connect, security, Role.STATION))
+                own = stack.enter_context(station_session([], connect, security))
                 self._picture_sessions.append(own)
             self._sessions = stack.pop_all()
         hear_vehicles(

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 
-from service.settings.vehicle import MAX_VEHICLE_NAME, VEHICLE_NAME_PATTERN
-
 ROOT = "uavdepth"
 DEPTH = "depth"
 SCAN = "scan"
@@ -17,6 +15,11 @@ RECEIVED = "received"
 
 ALIVE = "alive"
 """Liveliness token: there while the vehicle's session lives."""
+
+VEHICLE_NAME_PATTERN = r"^[A-Za-z0-9_-]+$"
+"""Letters that are legal in a Zenoh key without being a wildcard, a separator or a verbatim chunk."""
+
+MAX_VEHICLE_NAME = 64
 
 _NAME = re.compile(VEHICLE_NAME_PATTERN)
 

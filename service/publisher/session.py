@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from enum import Enum
 
 import zenoh
@@ -20,6 +22,8 @@ SEND_BUFFER_BYTES = 16_384
 
 MAX_MESSAGE_BYTES = 4_194_304
 """No picture is near it; by default a peer may have a gigabyte of memory reserved for one message."""
+
+_CLOSE_S = 0.5
 
 _SOURCE_PLACE = re.compile(r" at \S+\.rs:\d+\.?\]?")
 
@@ -79,6 +83,30 @@ def open_session(
         return zenoh.open(config)
     except zenoh.ZError as error:
         raise PublisherError(f"zenoh: {_reason(str(error), listen)}") from error
+
+
+@contextmanager
+def station_session(
+    listen: Sequence[str], connect: Sequence[str], security: Security | None = None
+) -> Iterator[zenoh.Session]:
+    """A station's or router's session for as long as the block lasts; see `open_session` and `close_soon`."""
+    session = open_session(listen, connect, security, Role.STATION)
+    try:
+        yield session
+    finally:
+        close_soon(session)
+
+
+def close_soon(session: zenoh.Session) -> None:
+    """Close a session; one that takes long (its peer accepts and says nothing: 15 s) is left to a thread."""
+
+    def close() -> None:
+        with suppress(zenoh.ZError):  # it is closed for good either way
+            session.close()  # type: ignore[no-untyped-call]
+
+    thread = threading.Thread(target=close, name="zenoh-close", daemon=True)
+    thread.start()
+    thread.join(_CLOSE_S)
 
 
 def _reason(text: str, listen: Sequence[str]) -> str:

@@ -14,9 +14,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final, Literal
 
+from service.publisher.keys import VEHICLE_NAME_PATTERN
 from service.security.certificates import Authority, KeyPair
 from service.security.errors import SecurityError
-from service.settings.vehicle import VEHICLE_NAME_PATTERN
 
 PORT: Final = 7447
 _AUTHORITY = "ca"

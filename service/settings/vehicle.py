@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from service.publisher.keys import MAX_VEHICLE_NAME, VEHICLE_NAME_PATTERN
 from service.settings.section import Section
-
-VEHICLE_NAME_PATTERN = r"^[A-Za-z0-9_-]+$"
-"""Letters that are legal in a Zenoh key without being a wildcard, a separator or a verbatim chunk."""
-
-MAX_VEHICLE_NAME = 64
 
 
 class VehicleSettings(Section):

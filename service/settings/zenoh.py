@@ -8,10 +8,10 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
+from service.publisher.keys import VEHICLE_NAME_PATTERN
 from service.security.access import Access
 from service.security.security import Certificates, Security
 from service.settings.section import Section
-from service.settings.vehicle import VEHICLE_NAME_PATTERN
 
 _ENDPOINT = re.compile(r"^(tcp|udp|tls)/(\[[0-9A-Fa-f:.]+\]|[^\s:/\[\]]+):(\d{1,5})([?#].*)?$")
 _ENDPOINT_FORM = "tcp/HOST:PORT, tls/HOST:PORT or udp/HOST:PORT"

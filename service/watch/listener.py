@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Self
 
 from service.clock import Clock
-from service.publisher.session import Role, open_session
+from service.publisher.session import Role, close_soon, open_session
 from service.publisher.vehicle_samples import hear_vehicles
 from service.security.security import Security
 from service.watch.board import Board
@@ -51,4 +51,4 @@ class Listener:
 
     def close(self) -> None:
         """Close the session."""
-        self._session.close()  # type: ignore[no-untyped-call]
+        close_soon(self._session)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import socket
 import threading
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 import zenoh
@@ -15,7 +15,7 @@ from publisher_support import Heard, listening, publishing, settings_on
 from service.clock import MonotonicClock
 from service.errors import PublisherError
 from service.publisher.publisher import ZenohPublisher
-from service.publisher.session import open_session
+from service.publisher.session import close_soon, open_session
 from service.security.errors import SecurityError
 from service.settings.zenoh import ZenohSettings
 
@@ -63,11 +63,12 @@ def test_a_peer_that_is_away_is_told_and_found_when_it_comes() -> None:
 class Stubborn:
     """A session whose peer has accepted and says nothing: it does not close."""
 
-    closing = 0
+    opened = closing = 0
     released = threading.Event()
 
     def __init__(self, session: zenoh.Session) -> None:
         self._session = session
+        Stubborn.opened += 1
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._session, name)
@@ -85,11 +86,13 @@ def test_nobody_waits_for_sessions_that_do_not_close(monkeypatch: pytest.MonkeyP
     settings = settings_on(free_port(), f"zenoh.connect=['tcp/127.0.0.1:{free_port()}']")
     publisher = ZenohPublisher(settings.zenoh, "kite", settings.camera.model, MonotonicClock())
     publisher.start()
-    wait_until(lambda: publisher.status.open)
+    wait_until(lambda: Stubborn.opened == 3)  # one that listens, one for scans and one for pictures
     publisher.close()
+    with open_session((f"tcp/127.0.0.1:{free_port()}",), ()) as station:
+        close_soon(cast(zenoh.Session, Stubborn(station)))
     try:
-        assert not Stubborn.released.is_set(), "it has come back and they are still there"
-        wait_until(lambda: Stubborn.closing == 2)
+        assert not Stubborn.released.is_set(), "both have come back and the sessions are still there"
+        wait_until(lambda: Stubborn.closing == 3)
     finally:
         Stubborn.released.set()
 
