@@ -120,7 +120,7 @@ class Metres:
                 ground = known
                 raw = self._ask(frame, ground, points)
         measured = Measurement(telemetry, points=0 if points is None else len(points))
-        trouble = _trouble_of(raw, telemetry)
+        trouble = self._trouble_of(raw, telemetry)
         if trouble is not None or telemetry.attitude is None:
             return replace(measured, trouble=trouble)
         by_ground = math.inf
@@ -139,7 +139,7 @@ class Metres:
         trouble = self._gate(scale, ground)
         if trouble is not None:
             return replace(measured, scale=scale, trouble=trouble)
-        depth = DepthMap(self._certain(raw), _joint_sigma(raw, scale.relative_sigma))
+        depth = DepthMap(raw.depth_m, _joint_sigma(raw, scale.relative_sigma))
         depth = self._without_far_end(depth, raw, scale)
         return replace(measured, depth=depth, scale=scale, height_m=_height_m(ground))
 
@@ -168,7 +168,7 @@ class Metres:
         self._mind_epoch(telemetry)
         points = self._measured_points(frame, telemetry_at)
         measured = Measurement(telemetry, points=0 if points is None else len(points))
-        trouble = _trouble_of(raw, telemetry)
+        trouble = self._trouble_of(raw, telemetry)
         if trouble is not None:
             return replace(measured, trouble=trouble)
         ground = self._ground.of(telemetry, telemetry.attitude)
@@ -186,9 +186,9 @@ class Metres:
         trouble = self._gate(scale, ground)
         if trouble is not None:
             return replace(measured, scale=scale, trouble=trouble)
-        depth = apply(replace(estimate, relative_sigma=sigma), seen)
+        depth = apply(replace(estimate, relative_sigma=sigma), raw)
         return replace(
-            measured, depth=self._without_far_end(depth, seen, scale), scale=scale, height_m=_height_m(ground)
+            measured, depth=self._without_far_end(depth, raw, scale), scale=scale, height_m=_height_m(ground)
         )
 
     def _age_s(self, estimate: ScaleEstimate, ground: KnownGround | Trouble, captured_ns: int) -> float:
@@ -239,22 +239,23 @@ class Metres:
         by_ekf = isinstance(ground, KnownGround) and not ground.height.by_rangefinder
         return Trouble.NO_HEIGHT if by_ekf else Trouble.BAD_SCALE
 
+    def _trouble_of(self, raw: DepthMap, telemetry: Telemetry) -> Trouble | None:
+        values = self._certain(raw) if raw.affine_inverse_depth is None else raw.affine_inverse_depth
+        if not np.isfinite(values).any():
+            return Trouble.NO_DEPTH
+        attitude = telemetry.attitude
+        if attitude is None or not math.isfinite(attitude.roll_rad + attitude.pitch_rad):
+            return Trouble.NO_ATTITUDE
+        return None
+
     def _certain(self, depth: DepthMap) -> NDArray[np.float32]:
-        """Depth with the pixels that the network is not sure of taken out."""
+        """Depth with the pixels that the network is not sure of taken out: metres are not found by those, and
+        where there is nothing else perception is blind. Among others a near one may be an obstacle.
+        """
         if depth.relative_sigma is None:
             return depth.depth_m
         sure = depth.relative_sigma <= self._max_pixel_sigma
         return np.where(sure, depth.depth_m, np.float32(np.nan))
-
-
-def _trouble_of(raw: DepthMap, telemetry: Telemetry) -> Trouble | None:
-    values = raw.depth_m if raw.affine_inverse_depth is None else raw.affine_inverse_depth
-    if not np.isfinite(values).any():
-        return Trouble.NO_DEPTH
-    attitude = telemetry.attitude
-    if attitude is None or not math.isfinite(attitude.roll_rad + attitude.pitch_rad):
-        return Trouble.NO_ATTITUDE
-    return None
 
 
 def _is_off(told: KnownGround | Trouble, known: KnownGround | Trouble) -> bool:
@@ -271,7 +272,8 @@ def _joint_sigma(raw: DepthMap, scale_sigma: float) -> NDArray[np.float32]:
     if raw.relative_sigma is None:
         return np.full(raw.depth_m.shape, scale_sigma, np.float32)
     # numpy's hypot takes ten times as long, to be right where squares overflow.
-    squared = np.square(raw.relative_sigma)
+    with np.errstate(over="ignore"):
+        squared = np.square(raw.relative_sigma)
     squared += np.float32(scale_sigma**2)
     return np.sqrt(squared, out=squared)
 

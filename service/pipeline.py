@@ -18,6 +18,7 @@ from service.metres import Metres
 from service.mount_watch import MountWatch
 from service.network import answers_in_metres, load_network, network_kind
 from service.perception_result import PerceptionResult, unknown_scan
+from service.planar_track import PlanarTrack
 from service.settings import Settings
 from service.telemetry import Telemetry
 from service.trouble import Trouble
@@ -81,6 +82,7 @@ class Perception:
         self._metres = Metres(settings, model, scale, takes, model_max_depth_m)
         self._scanner = scanner
         self._memory = ScanMemory(settings.scan.memory_s)
+        self._track = PlanarTrack()
         self._mount_watch = MountWatch(settings, self._metres.without_hints)
         self._has_told_suspicion = False
         self._model_failures = 0
@@ -196,7 +198,8 @@ class Perception:
         if np.all(scan.state == SectorState.UNKNOWN):
             # ArduPilot reads "unknown everywhere" as healthy and free (measured): silence is the only no.
             return result.distrusted(Trouble.NO_DEPTH)
-        return replace(result, scan=self._memory.merge(scan, blank.captured_ns, pose_of(measured.telemetry)))
+        pose = self._track.pose_at(measured.telemetry)
+        return replace(result, scan=self._memory.merge(scan, blank.captured_ns, pose))
 
 
 def make_scanner(settings: Settings) -> Scanner:
@@ -224,6 +227,7 @@ def make_scanner(settings: Settings) -> Scanner:
         sigma_factor=scan.sigma_factor,
         mask=mask,
         max_ground_slope_deg=scan.max_ground_slope_deg,
+        max_relative_sigma=settings.model.max_relative_sigma,
     )
 
 

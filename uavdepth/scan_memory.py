@@ -27,6 +27,10 @@ _SAME_THING = 1.3
 """Ratio of distances up to which two frames speak of the same thing: flicker is +-20 %, less what the nearest
 of many points averages out."""
 
+_LEAST_DEG = 2.0
+"""An obstacle that is carried is told in elements that hold so much of its arc. A turn would otherwise make
+each one two elements wide, and half of that a direction in which nothing was seen."""
+
 _PASSED_M = 0.05
 """An obstacle that the vehicle has come to by dead reckoning, and through, was none in its way."""
 
@@ -128,7 +132,7 @@ def _is_finite(pose: PlanarPose) -> bool:
 def _carried(kept: Sequence[_Remembered], pose: PlanarPose) -> list[ObstacleScan]:
     turned, ways = zip(*(one.pose.motion_to(pose) for one in kept), strict=True)
     carried = []
-    for moved in moved_scans([one.scan for one in kept], turned, ways):
+    for moved in moved_scans([one.scan for one in kept], turned, ways, _LEAST_DEG):
         with np.errstate(invalid="ignore"):
             passed = moved.distance_m <= _PASSED_M
         state = np.where(passed, np.uint8(SectorState.UNKNOWN), moved.state)

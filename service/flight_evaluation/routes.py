@@ -175,7 +175,7 @@ def _free_m(scene: Scene, place: Route, half_m: float) -> float:
     highest_m = BAND.above_m + _BAND_MARGIN_M
     free_m = math.inf
     # Coarsely first; then close enough together for poles, and for wires.
-    for across, along in ((9, 5), (round(2 * half_m / 0.1), 5), (5, round((highest_m - lowest_m) / 0.03))):
+    for across, along in ((9, 5), (round(2 * half_m / 0.03), 5), (5, round((highest_m - lowest_m) / 0.03))):
         aside, up = np.meshgrid(np.linspace(-half_m, half_m, across), np.linspace(lowest_m, highest_m, along))
         free_m = min(free_m, float(_cast(scene, place, aside.ravel(), up.ravel()).min()))
         if free_m < _FRONT_M:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -51,12 +49,5 @@ class InMetres:
 
 def perception_of_depth(settings: Settings, source: RecordedDepth) -> Perception:
     """The pipeline behind the network: scan, memory and everything after it."""
-    quiet = settings.model_copy(
-        update={
-            "motion": settings.motion.model_copy(update={"points": False}),
-            # In flight the network's own doubt was held against the limit; the recorded one is larger by that
-            # of the scale, and what was too doubtful is not in recorded depth.
-            "model": settings.model.model_copy(update={"max_relative_sigma": math.inf}),
-        }
-    )
+    quiet = settings.model_copy(update={"motion": settings.motion.model_copy(update={"points": False})})
     return Perception(quiet, source, InMetres(), make_scanner(quiet), takes=())

@@ -193,13 +193,38 @@ def test_a_mask_that_does_not_fit_is_refused_by_its_key(tmp_path: Path) -> None:
 def test_an_obstacle_that_leaves_the_picture_is_remembered_for_half_a_second() -> None:
     model = FixedDepth(shrunk(wall_over_ground(CAMERA, 8.0)))
     perception = perception_of(model)
-    here = replace(FLYING, position_ned_m=(0.0, 0.0, -FLYING_HEIGHT_M))
+    here = replace(FLYING, position_ned_m=(0.0, 0.0, -FLYING_HEIGHT_M), velocity_ned_mps=(0.0, 0.0, 0.0))
     turned = replace(here, attitude=Attitude(0.0, 0.0, 1.2))
     left = AHEAD - round(np.degrees(1.2) / 5)
     assert perception.step(frame_at(0.0), here).scan.state[AHEAD] == SectorState.OBSTACLE
     assert perception.step(frame_at(0.4), turned).scan.state[left] == SectorState.OBSTACLE
     perception.step(frame_at(1.0), here)
     assert perception.step(frame_at(1.6), turned).scan.state[left] == SectorState.UNKNOWN
+
+
+@pytest.mark.parametrize(
+    ("position_m", "velocity_mps", "left_m"),
+    [(5.0, 0.0, 8.0), (0.0, 12.0, None)],
+    ids=["position", "velocity"],
+)
+def test_an_estimate_that_is_reset_moves_nothing_that_was_seen(
+    position_m: float, velocity_mps: float, left_m: float | None
+) -> None:
+    perception = perception_of(FixedDepth(shrunk(wall_over_ground(CAMERA, 8.0))))
+    here = replace(FLYING, position_ned_m=(0.0, 0.0, -FLYING_HEIGHT_M), velocity_ned_mps=(0.0, 0.0, 0.0))
+    reset = replace(
+        here,
+        attitude=Attitude(0.0, 0.0, 1.2),
+        position_ned_m=(position_m, 0.0, -FLYING_HEIGHT_M),
+        velocity_ned_mps=(velocity_mps, 0.0, 0.0),
+    )
+    perception.step(frame_at(0.0), here)
+    told = perception.step(frame_at(0.1), reset).scan
+    left = AHEAD - round(np.degrees(1.2) / 5)
+    if left_m is None:
+        assert told.state[left] == SectorState.UNKNOWN, "how far it has moved is not known"
+    else:
+        assert told.distance_m[left] == pytest.approx(left_m, rel=0.03)
 
 
 @pytest.mark.parametrize("error", [RuntimeError("provider broke"), ImageSizeError("160x96"), KeyError("x")])
@@ -215,17 +240,19 @@ def test_a_network_that_fails_is_counted_and_the_next_picture_goes_on(error: Exc
     assert perception.model_failures == 1
 
 
-def test_pixels_that_the_network_is_not_sure_of_are_unknown() -> None:
-    depth_m = shrunk(wall_over_ground(CAMERA, 8.0))
+@pytest.mark.parametrize(("wall_m", "told"), [(8.0, SectorState.OBSTACLE), (30.0, SectorState.UNKNOWN)])
+def test_depth_that_the_network_is_not_sure_of_warns_when_near_and_frees_nothing(
+    wall_m: float, told: SectorState
+) -> None:
+    depth_m = shrunk(wall_over_ground(CAMERA, wall_m))
     sigma = np.zeros_like(depth_m)
     sigma[:, : CAMERA.width // 2] = 3.0
     sigma[:, CAMERA.width // 2 : CAMERA.width // 2 + 4] = np.nan
     result = perception_of(FixedDepth(depth_m, sigma)).step(frame_at(0.0), FLYING)
     assert result.trusted
-    assert np.all(result.scan.state[:AHEAD] == SectorState.UNKNOWN)
-    assert np.any(result.scan.state[AHEAD + 1 :] == SectorState.OBSTACLE)
-    assert result.depth is not None
-    assert np.all(np.isnan(result.depth.depth_m[:, : CAMERA.width // 2 + 4]))
+    assert not np.any(result.scan.state[:AHEAD] == SectorState.CLEAR)
+    assert np.all(result.scan.state[AHEAD - 3 : AHEAD] == told)
+    assert result.scan.state[AHEAD + 2] == (told or SectorState.CLEAR)
 
 
 def test_the_far_end_of_the_network_never_stands_there_as_a_wall() -> None:

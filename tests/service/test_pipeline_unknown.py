@@ -33,6 +33,9 @@ RAYS = body_rays(CAMERA, MOUNT)
 CLEAR_WORD = 2001
 """20 m and a centimetre."""
 
+DOUBTS = (0.51, 0.7, 3.0, math.inf)
+"""Beyond the limit of 0.5."""
+
 NOT_KNOWN = ("nan", "zero", "negative", "minus infinity", "doubted", "doubt not known", "masked")
 
 
@@ -113,7 +116,7 @@ def perceive(case: Case) -> PerceptionResult:
     if case.how in values:
         depth[unknown] = values[case.how]
     elif sigma is not None and case.how != "masked":
-        sigma[unknown] = np.nan if case.how == "doubt not known" else 3.0
+        sigma[unknown] = np.nan if case.how == "doubt not known" else rng.choice(DOUBTS)
     depth32 = depth.astype(np.float32)
     answer = DepthMap(depth32, None if sigma is None else sigma.astype(np.float32))
     mask = unknown if case.how == "masked" else None
