@@ -18,6 +18,12 @@ from service.replay.footage import Packets, RecordedPicture
 from service.replay.recorded_images import depth_of, image_of, sigma_of
 from uavdepth.depth_map import DepthMap
 
+_MAX_MAVLINK_BYTES = 1024 * 1024 * 1024
+"""A day of a fast line; a hostile file unpacks to many times its size."""
+
+_PACKETS_BYTES = 200
+"""What an arrival costs besides its data."""
+
 _MAX_CONFIGURATION_BYTES = 1_000_000
 
 
@@ -71,6 +77,7 @@ class Recording:
         reader = RecordReader(path)
         topics: dict[int, str] = {}
         packets: list[Packets] = []
+        held_bytes = 0
         offset_ns: int | None = None
         for item in reader.items():
             if isinstance(item, Metadata) and item.name == layout.METADATA:
@@ -85,6 +92,10 @@ class Recording:
                 topic = topics.get(item.channel_id, "")
                 self.picture_count += layout.camera_of(topic) == (layout.NOTE, "")
                 at_ns = item.log_time - offset_ns
+                if topic.startswith((layout.MAVLINK_OUT_TOPIC, layout.MAVLINK_IN_TOPIC)):
+                    held_bytes += len(item.data) + _PACKETS_BYTES
+                    if held_bytes > _MAX_MAVLINK_BYTES:
+                        raise RecordError(f"{path}: more than {_MAX_MAVLINK_BYTES} bytes of MAVLink")
                 if topic == layout.MAVLINK_OUT_TOPIC:
                     packets.append(Packets(at_ns, item.data, outgoing=True))
                 elif topic.startswith(layout.MAVLINK_IN_TOPIC):

@@ -140,6 +140,16 @@ def test_a_chunk_that_claims_to_hold_terabytes_costs_nothing(tmp_path: Path) -> 
     assert list(RecordReader(path).items()) == []
 
 
+def test_a_record_that_unpacks_to_endless_telemetry_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = record_of(tmp_path)
+    Recording([path])
+    monkeypatch.setattr("service.replay.recording._MAX_MAVLINK_BYTES", 2_000)
+    with pytest.raises(RecordError, match="more than 2000 bytes of MAVLink"):
+        Recording([path])
+
+
 def test_a_broken_record_in_a_folder_is_named_and_the_others_are_played(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
