@@ -40,8 +40,8 @@ class RecordSettings(Section):
         ge=0.0,
         le=60.0,
         title="Depth pictures per second",
-        description="Upper limit for depth in millimetres and its uncertainty, by far the largest part of a record; "
-        "0: none.",
+        description="Upper limit for depth in millimetres and its uncertainty, by far the largest part of a "
+        "record; 0: none.",
     )
     tlog: bool = Field(
         default=True,
