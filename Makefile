@@ -32,9 +32,13 @@ comma := ,
 demo: $(DEMO)/.ready
 	@$(DEMO)/bin/uavdepth demo --seconds $(DEMO_SECONDS) --output demo_out
 
-# The tests of a file stay in one process: they share worlds and recordings.
+# The tests of the service live in real time: one after the other. The rest needs nothing but processors; the
+# tests of a file stay in one process, for they share worlds and recordings.
 test: $(DEV)/.ready
-	$(DEV)/bin/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
+	@status=0; \
+	$(DEV)/bin/python -m pytest tests/service || status=1; \
+	$(DEV)/bin/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder --ignore tests/service || status=1; \
+	exit $$status
 
 lint: $(DEV)/.ready
 	$(DEV)/bin/ruff check .
