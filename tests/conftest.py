@@ -1,4 +1,4 @@
-"""What tests need that run beside each other: `make test` runs two processes of them."""
+"""What tests need that run beside each other: `make test` runs most in two processes."""
 
 from __future__ import annotations
 
