@@ -139,7 +139,7 @@ class Metres:
         trouble = self._gate(scale, ground)
         if trouble is not None:
             return replace(measured, scale=scale, trouble=trouble)
-        depth = DepthMap(raw.depth_m, _joint_sigma(raw, scale.relative_sigma))
+        depth = self._doubted(raw, DepthMap(raw.depth_m, _joint_sigma(raw, scale.relative_sigma)))
         depth = self._without_far_end(depth, raw, scale)
         return replace(measured, depth=depth, scale=scale, height_m=_height_m(ground))
 
@@ -186,7 +186,7 @@ class Metres:
         trouble = self._gate(scale, ground)
         if trouble is not None:
             return replace(measured, scale=scale, trouble=trouble)
-        depth = apply(replace(estimate, relative_sigma=sigma), raw)
+        depth = self._doubted(raw, apply(replace(estimate, relative_sigma=sigma), raw))
         return replace(
             measured, depth=self._without_far_end(depth, raw, scale), scale=scale, height_m=_height_m(ground)
         )
@@ -247,6 +247,13 @@ class Metres:
         if attitude is None or not math.isfinite(attitude.roll_rad + attitude.pitch_rad):
             return Trouble.NO_ATTITUDE
         return None
+
+    def _doubted(self, raw: DepthMap, metres: DepthMap) -> DepthMap:
+        """Metres in which what the network itself is not sure of is beyond any doubt that frees a way."""
+        if raw.relative_sigma is None or metres.relative_sigma is None:
+            return metres
+        sure = raw.relative_sigma <= self._max_pixel_sigma
+        return replace(metres, relative_sigma=np.where(sure, metres.relative_sigma, np.float32(np.inf)))
 
     def _certain(self, depth: DepthMap) -> NDArray[np.float32]:
         """Depth with the pixels that the network is not sure of taken out: metres are not found by those, and

@@ -227,7 +227,7 @@ def make_scanner(settings: Settings) -> Scanner:
         sigma_factor=scan.sigma_factor,
         mask=mask,
         max_ground_slope_deg=scan.max_ground_slope_deg,
-        max_relative_sigma=settings.model.max_relative_sigma,
+        max_relative_sigma=math.hypot(settings.model.max_relative_sigma, settings.scale.max_relative_sigma),
     )
 
 

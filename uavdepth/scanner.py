@@ -19,17 +19,13 @@ from uavdepth.level_points import level_points, near_heights
 from uavdepth.obstacle_scan import ObstacleScan, SectorState, sector_bearings_deg
 from uavdepth.range_histogram import RangeHistogram
 from uavdepth.required_pixels import pixels_of_line, pixels_of_thing, smallest_thing
+from uavdepth.scan_caution import ScanCaution
 from uavdepth.sloping_ground import GroundProfile, SlopingGround
 from uavdepth.speckles import SpeckleFilter
 
 FREE_SHARE = 0.7
 """Share of the band's height that must be seen free before an element is clear. The flight level
 itself is then always among what is seen: of the default band it lies at 43 % from the top."""
-
-LARGEST_SHORTENING = 0.4
-"""However doubtful a distance, at most so much of it is taken off: an obstacle at no distance at all would
-stop the vehicle for good. The network that ships is off by no more downwards where it doubts more: where it
-claims 0.3 to 0.6, one true distance in six is below 0.8 of the told one, and one in twenty below 0.5."""
 
 _GROUND_STRIDE = 4
 _SLOPE_ROWS, _SLOPE_COLUMNS = 2, 8
@@ -118,17 +114,11 @@ class ObstacleScanner:
             raise ScanError(f"min_pixels is {min_pixels}: at least 1 is needed")
         if not 0.0 <= ground_tolerance <= 0.5:
             raise ScanError(f"ground_tolerance is {ground_tolerance}: 0 to 0.5 is needed")
-        if not 0.0 <= sigma_factor <= 5.0:
-            raise ScanError(f"sigma_factor is {sigma_factor}: 0 to 5 is needed")
-        if not max_relative_sigma > 0.0:
-            raise ScanError(f"max_relative_sigma is {max_relative_sigma}: above 0 is needed")
         if not 0.0 <= max_ground_slope_deg <= 25.0:
             raise ScanError(f"max_ground_slope_deg is {max_ground_slope_deg}: 0 to 25 is needed")
         self.camera = camera
         self.mount = mount
-        self._sigma_factor = np.float32(sigma_factor)
-        self._largest_shortening = np.float32(LARGEST_SHORTENING if sigma_factor > 0 else 0.0)
-        self._max_sigma = np.float32(max_relative_sigma)
+        self._caution = ScanCaution(sigma_factor, max_relative_sigma)
         self._mask = None if mask is None else self._of_camera("mask", np.array(mask, dtype=np.bool_))
         self.min_distance_m = float(min_distance_m)
         self.max_distance_m = float(max_distance_m)
@@ -143,7 +133,7 @@ class ObstacleScanner:
         self._slope_rays = np.ascontiguousarray(rays[:, 1::_SLOPE_ROWS, 4::_SLOPE_COLUMNS]).reshape(3, -1)
         self._sloping = SlopingGround(max_ground_slope_deg, max_distance_m, ground_tolerance)
         self._view = BandView(camera, mount, max_distance_m, below_m, above_m)
-        farthest_m = max_distance_m / (1 - float(self._largest_shortening))
+        farthest_m = max_distance_m / (1 - self._caution.largest_shortening)
         self._histogram = RangeHistogram(farthest_m, self._joined_rays.shape[1])
         if min_pixels is None:
             min_pixels = smallest_thing(camera, max_distance_m)
@@ -219,7 +209,9 @@ class ObstacleScanner:
                 rays, chunk_depth, level, self.mount.position_body_m, -self.above_m, self.below_m
             )
             points, range_m = self._level_points(rays.take(near, axis=1), chunk_depth[near], level)
-            shortening, reach_m = self._told(None if doubt is None else doubt[chunk][near])
+            shortening = reach_m = None
+            if doubt is not None:
+                shortening, reach_m = self._caution.told(doubt[chunk][near], self.max_distance_m)
             obstacle = self._is_obstacle(points, range_m, ground, reach_m)
             if obstacle.any():
                 self._histogram.add(points[0], points[1], range_m, obstacle, shortening)
@@ -227,17 +219,6 @@ class ObstacleScanner:
         # On the mean of its points it may lie beyond after all; as none of them is clear, it is unknown then.
         distance[distance >= self.max_distance_m] = np.nan
         return distance
-
-    def _told(
-        self, sigma: NDArray[np.float32] | None
-    ) -> tuple[NDArray[np.float32] | None, NDArray[np.float32] | None]:
-        """(N,) share of each pixel's distance to take off, and (N,) range within which it is an obstacle."""
-        if sigma is None:
-            return None, None
-        largest, most_m = self._largest_shortening, np.float32(self.max_distance_m)
-        tells = self._tells(sigma)
-        shortening = np.where(tells, np.minimum(self._doubt(sigma), largest), largest)
-        return shortening, np.where(tells, most_m / (1 - shortening), most_m)
 
     def _seen_free(
         self,
@@ -253,23 +234,11 @@ class ObstacleScanner:
         points, range_m = self._level_points(rays, probed, level)
         free = (probed > 0) & ~self._is_obstacle(points, range_m, ground)
         if sigma is not None:
-            doubt = sigma.ravel()[probe.pixel]
-            free &= self._tells(doubt)
-            doubt = self._doubt(doubt)
-            free &= doubt < 1
-            share = np.where(free, 1 - doubt, np.float32(1))  # nothing at no distance is no number
+            share = self._caution.least_share(sigma.ravel()[probe.pixel])
+            free &= ~np.isnan(share)
             points, range_m = self._level_points(rays, probed * share, level)
             free &= ~self._is_obstacle(points, range_m, ground)
         return seen_sectors(free, probe.cell, FREE_SHARE)
-
-    def _tells(self, sigma: NDArray[np.float32]) -> NDArray[np.bool_]:
-        """Whether depth is worth something; NaN fails: no claim is not a small claim."""
-        return np.asarray((sigma >= 0) & (sigma <= self._max_sigma), dtype=np.bool_)
-
-    def _doubt(self, sigma: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Share of its distance by which depth may be nearer."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            return sigma * self._sigma_factor
 
     def _level_points(
         self, rays: NDArray[np.float32], depth: NDArray[np.float32], level: NDArray[np.float64]

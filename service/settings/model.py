@@ -43,6 +43,6 @@ class ModelSettings(Section):
         gt=0.0,
         le=10.0,
         title="Largest uncertainty of a pixel",
-        description="Pixels whose standard deviation over depth, that of the scale included, is larger make no "
-        "direction clear; near ones are obstacles still. Only networks with an uncertainty output have it.",
+        description="Pixels whose standard deviation over depth is larger make no direction clear; near ones "
+        "are obstacles still. Only networks with an uncertainty output have it.",
     )
