@@ -93,12 +93,18 @@ def test_the_estimator_is_measured_with_depth_that_has_no_metres(past_a_wall: Gr
 
 
 def test_a_target_that_nothing_was_measured_for_is_missed(past_a_wall: GroupSummary) -> None:
-    found = {target.what: target for target in targets({"flight": past_a_wall})}
-    assert found["flight: points, median error <= 0.05"].met
-    # One wall at one depth: scale and shift of an affine network cannot be told.
-    affine = found["flight: scale of truth affine, median error <= 0.05"]
-    assert affine.found is None
-    assert not affine.met
+    unseen = GroupSummary.of(evaluate_journey(WallJourney(hidden=True, pictures=2), None))
+    found, missed = (targets({"flight": group})[0] for group in (past_a_wall, unseen))
+    assert found.what == missed.what == "flight: points, median error <= 0.05"
+    assert found.met
+    assert missed.found is None
+    assert not missed.met
+
+
+def test_points_at_one_depth_do_not_tell_scale_and_shift(past_a_wall: GroupSummary) -> None:
+    by_points = past_a_wall.scales["truth affine, points"]
+    assert by_points is not None
+    assert by_points.trusted == 0.0
 
 
 def test_without_any_truth_held_out_points_stand_for_it() -> None:
