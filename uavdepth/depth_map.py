@@ -31,6 +31,13 @@ class DepthMap:
     relative_sigma: NDArray[np.float32] | None = None
     affine_inverse_depth: NDArray[np.float32] | None = None
 
+    @property
+    def believed_m(self) -> NDArray[np.float32]:
+        """(H, W) `depth_m` as it may be shown: NaN also where its uncertainty is not finite."""
+        if self.relative_sigma is None:
+            return self.depth_m
+        return np.where(np.isfinite(self.relative_sigma), self.depth_m, np.float32(np.nan))
+
     @classmethod
     def from_affine(cls, affine_inverse_depth: NDArray[np.float32]) -> DepthMap:
         """Depth that is not known yet, of inverse depth up to scale and shift."""

@@ -76,7 +76,7 @@ class PictureSource:
         if result.depth is None:
             return None
         settings = self._settings
-        codes = depth_codes(result.depth.depth_m, settings.depth_near_m, settings.depth_far_m)
+        codes = depth_codes(result.depth.believed_m, settings.depth_near_m, settings.depth_far_m)
         if topic == keys.VIDEO:
             return self._h264(codes, stamp, budget.bytes_per_s, now_ns)
         divisor = self._ladders[topic].step.divisor

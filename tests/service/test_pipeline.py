@@ -253,6 +253,8 @@ def test_depth_that_the_network_is_not_sure_of_warns_when_near_and_frees_nothing
     assert not np.any(result.scan.state[:AHEAD] == SectorState.CLEAR)
     assert np.all(result.scan.state[AHEAD - 3 : AHEAD] == told)
     assert result.scan.state[AHEAD + 2] == (told or SectorState.CLEAR)
+    assert result.depth is not None
+    assert np.all(np.isnan(result.depth.believed_m[:, : CAMERA.width // 2 + 4])), "nor is it shown as known"
 
 
 def test_the_far_end_of_the_network_never_stands_there_as_a_wall() -> None:
