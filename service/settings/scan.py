@@ -48,8 +48,8 @@ class ScanSettings(Section):
         le=5.0,
         title="Caution about distances, standard deviations",
         description="Distances are told as d * (1 - sigma_factor * sigma), sigma being the network's own "
-        "relative uncertainty, and a direction is clear only if it would be at that distance too. "
-        "0 ignores uncertainty.",
+        "relative uncertainty, two fifths nearer at most, and a direction is clear only if it would be at "
+        "d * (1 - sigma_factor * sigma) too. 0 shortens nothing.",
     )
     max_ground_slope_deg: float = Field(
         default=15.0,
