@@ -30,6 +30,9 @@ _EDGE_RATIO = 1.4
 """Neighbouring elements whose true distances differ so much mark an edge; an outline without edges, such as
 a wall across the view, fits whichever way it is turned."""
 
+_WORST_FIT, _LEAST_GAP, _BESIDE_DEG = 0.2, 0.03, 5.0
+"""An outline that fits nowhere, or nearly as well more than an element beside, tells no turn. Exact depth at
+its own moment, with nothing to be made good, fitted up to 18 degrees beside where it fitted so badly."""
 
 TURN_S = 3.0
 _BEGIN_S = 1.0
@@ -96,8 +99,11 @@ def outline_turn_deg(
     turns = np.arange(-_LARGEST_DEG, _LARGEST_DEG + 1e-9, _STEP_DEG)
     costs = np.array([_misfit(told, _elements_of(outline, bearings - turn)) for turn in turns])
     # Elements are 5 degrees wide: of turns that fit equally well the middle one is meant.
-    best = turns[costs <= costs.min() + 1e-3]
-    return float(np.mean(best))
+    turn = float(np.mean(turns[costs <= costs.min() + 1e-3]))
+    beside = costs[np.abs(turns - turn) > _BESIDE_DEG].min()
+    if costs.min() > _WORST_FIT or beside < costs.min() + _LEAST_GAP:
+        return None
+    return turn
 
 
 def _misfit(told_m: NDArray[np.float64], true_m: NDArray[np.float64]) -> float:

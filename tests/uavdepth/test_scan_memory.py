@@ -57,6 +57,13 @@ class TestUnknown:
         scan = shown(memory, NOTHING, 400_000_000, north=2.0)
         assert scan.nearest_m == pytest.approx(6.0, abs=0.1)
 
+    def test_a_turn_carries_an_obstacle_into_the_elements_that_hold_much_of_it_and_no_others(self):
+        for yaw_deg, told in ((1.5, [0]), (2.5, [-5, 0]), (3.5, [-5]), (5.0, [-5])):
+            memory = ScanMemory()
+            shown(memory, single(0, 8.0), 0)
+            scan = shown(memory, NOTHING, FRAME_NS, yaw_deg=yaw_deg)
+            assert obstacles(scan) == [element(bearing) for bearing in told], yaw_deg
+
     def test_what_the_vehicle_has_come_to_and_not_met_was_not_there(self):
         memory = ScanMemory()
         shown(memory, single(0, 1.0), 0)
