@@ -23,8 +23,8 @@ class FreshFrames:
     """Takes pictures out of the camera's slot; one thread.
 
     Where measuring takes about as long as the camera from picture to picture, each picture would be measured
-    when the next is about to come, and be sent that much later. So a picture that has waited for four fifths of
-    that time gives way to the next.
+    when the next is about to come, and be sent that much later. So a picture that has waited for four fifths
+    of that time gives way to the next.
 
     Args:
         clock: the service's, by which pictures are stamped.
