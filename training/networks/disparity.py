@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from typing import Protocol
 
@@ -36,7 +37,7 @@ class ReflectConv(nn.Conv2d):
         return super().forward(functional.pad(input, (1, 1, 1, 1), mode="reflect"))
 
 
-class DisparityNetwork(nn.Module):
+class DisparityNetwork(nn.Module, ABC):
     """An encoder, a decoder and a disparity head on each of the decoder's four finest maps.
 
     Args:
@@ -62,9 +63,9 @@ class DisparityNetwork(nn.Module):
         _check_size(image)
         return self._disparities(self.decode(self.encoder(image)))
 
+    @abstractmethod
     def decode(self, pyramid: Sequence[Tensor]) -> Sequence[Tensor]:
         """The decoder's maps at 1, 1/2, 1/4 and 1/8 of the picture from the encoder's five."""
-        raise NotImplementedError
 
     def _disparities(self, features: Iterable[Tensor]) -> tuple[Tensor, ...]:
         return tuple(torch.sigmoid(head(item)) for head, item in zip(self.heads, features, strict=True))
