@@ -17,6 +17,7 @@ from uavdepth.hints import Hints
 from uavdepth.inference import InferenceSession, open_session
 from uavdepth.model_card import ModelCard
 from uavdepth.network_file import WEIGHTS_FOLDER, find_network, network_problems, read_card
+from uavdepth.point_fit import fit_to_points
 
 __all__ = ["WEIGHTS_FOLDER", "DepthModel"]
 
@@ -98,7 +99,8 @@ class DepthModel:
             image_bgr: (H, W, 3) uint8 picture of this camera, not undistorted.
             camera: the camera, in the pixels of the picture.
             hints: what the vehicle knows. Those that the network does not take are left out, and it
-                works without those that are not given.
+                works without those that are not given. The answer of one that takes points is drawn to
+                them (`uavdepth.point_fit`).
 
         Raises:
             ImageSizeError: the picture's size is not the camera's, or it is not an 8-bit BGR picture.
@@ -112,6 +114,8 @@ class DepthModel:
         outputs = self._session.run(self._output_names, inputs)
 
         values = self._rows_and_columns(outputs[0])
+        if self.card.output == "log_inverse_depth" and "points" in self.card.hints:
+            values = fit_to_points(values, inputs[self.card.points_name][0])
         if self.card.output == "affine_inverse_depth":
             values = np.where(np.isfinite(values), values, np.float32(np.nan))
             return DepthMap.from_affine(_to_pixels_of(camera, values))
