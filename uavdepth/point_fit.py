@@ -7,8 +7,8 @@ the distance in the picture and in log depth, a joint bilateral filter (Kopf et 
 first over large parts of the picture, then, with what is left, over small ones.
 
 Measured on rendered validation frames, metric Abs Rel with 100 points falls by 2 %, with the pictures'
-colours and shades distorted by 9 %, on KITTI by a third (22 Nov 2026; docs/evaluation.md has the figures of
-the test frames).
+colours and shades distorted by 9 %, on KITTI by a third (22 Nov 2026; docs/evaluation.json has the
+figures of the test frames).
 """
 
 from __future__ import annotations
