@@ -12,7 +12,7 @@ from service.trouble import Trouble
 from service.vehicle_height import KnownHeight, VehicleHeight
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraMount
-from uavdepth.hints import GroundHint
+from uavdepth.model.hints import GroundHint
 
 _STEP_NS = 50_000_000
 LAGS_NS = (_STEP_NS, 2 * _STEP_NS)

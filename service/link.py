@@ -7,7 +7,7 @@ from typing import Protocol
 from service.autopilot.link_status import LinkStatus
 from service.autopilot.service_state import ServiceState
 from service.telemetry import Telemetry
-from uavdepth.obstacle_scan import ObstacleScan
+from uavdepth.scan.obstacle_scan import ObstacleScan
 
 
 class Link(Protocol):

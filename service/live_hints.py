@@ -12,9 +12,9 @@ from service.frame import Frame
 from service.settings.motion import MotionSettings
 from service.telemetry import Telemetry
 from uavdepth.camera import CameraModel, CameraMount
-from uavdepth.hints import PointHints
-from uavdepth.motion_points import MotionPoints
-from uavdepth.vehicle_motion import VehicleMotion
+from uavdepth.model.hints import PointHints
+from uavdepth.motion.motion_points import MotionPoints
+from uavdepth.motion.vehicle_motion import VehicleMotion
 
 log = structlog.get_logger()
 

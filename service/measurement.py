@@ -12,9 +12,9 @@ from service.scale_status import ScaleStatus
 from service.telemetry import Telemetry
 from service.trouble import Trouble
 from uavdepth.camera import CameraModel
-from uavdepth.depth_map import DepthMap
-from uavdepth.hints import GroundHint, Hints, PointHints
-from uavdepth.scale_estimator import NetworkKind, ScaleEstimate
+from uavdepth.depth.depth_map import DepthMap
+from uavdepth.model.hints import GroundHint, Hints, PointHints
+from uavdepth.scale.estimator import NetworkKind, ScaleEstimate
 
 
 class DepthSource(Protocol):
@@ -27,7 +27,7 @@ class DepthSource(Protocol):
 
 
 class ScaleSource(Protocol):
-    """What finds the metres of a network's depth (`uavdepth.scale_estimator.ScaleEstimator`)."""
+    """What finds the metres of a network's depth (`uavdepth.scale.estimator.ScaleEstimator`)."""
 
     @property
     def kind(self) -> NetworkKind:

@@ -18,9 +18,9 @@ from service.settings import Settings
 from service.telemetry import Telemetry
 from service.trouble import Trouble
 from service.vehicle_height import VehicleHeight
-from uavdepth.depth_map import DepthMap
-from uavdepth.hints import GroundHint, Hints, PointHints
-from uavdepth.scale_estimator import ScaleEstimate, ScaleEstimator, apply
+from uavdepth.depth.depth_map import DepthMap
+from uavdepth.model.hints import GroundHint, Hints, PointHints
+from uavdepth.scale.estimator import ScaleEstimate, ScaleEstimator, apply
 
 _COMPARED_EVERY_NS = 200_000_000
 

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
-from uavdepth.depth_map import DepthMap
-from uavdepth.depth_model import DepthModel
+from uavdepth.depth.depth_map import DepthMap
 from uavdepth.errors import ModelCardError, ModelFileError, ProviderFallbackWarning
-from uavdepth.hints import GroundHint, Hints
-from uavdepth.inference import InferenceSession, open_session
-from uavdepth.model_card import CARD_METADATA_KEY, ModelCard
-from uavdepth.network_file import Problem, card_beside, find_network, network_problems, read_card
-from uavdepth.providers import runtime_errors
+from uavdepth.model.card import CARD_METADATA_KEY, ModelCard
+from uavdepth.model.depth_model import DepthModel
+from uavdepth.model.hints import GroundHint, Hints
+from uavdepth.model.inference import InferenceSession, open_session
+from uavdepth.model.network_file import Problem, card_beside, find_network, network_problems, read_card
+from uavdepth.model.providers import runtime_errors
 
 model_app = typer.Typer(no_args_is_help=True)
 

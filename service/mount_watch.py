@@ -10,9 +10,9 @@ import structlog
 from service.frame import Frame
 from service.settings import Settings
 from service.telemetry import Telemetry
-from uavdepth.depth_map import DepthMap
-from uavdepth.ground_plane import GroundPlane, find_ground_plane
+from uavdepth.depth.depth_map import DepthMap
 from uavdepth.mount_check import MountState, MountVerdict, check_mount
+from uavdepth.scale.ground_plane import GroundPlane, find_ground_plane
 
 log = structlog.get_logger()
 

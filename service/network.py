@@ -12,9 +12,9 @@ from service.settings import Settings
 from uavdepth.errors import ModelCardError, ModelFileError, ProviderFallbackWarning
 
 if TYPE_CHECKING:
-    from uavdepth.depth_model import DepthModel
-    from uavdepth.model_card import ModelCard
-    from uavdepth.scale_estimator import NetworkKind
+    from uavdepth.model.card import ModelCard
+    from uavdepth.model.depth_model import DepthModel
+    from uavdepth.scale.estimator import NetworkKind
 
 log = structlog.get_logger()
 
@@ -25,7 +25,7 @@ def load_network(settings: Settings) -> DepthModel:
     Raises:
         ConfigError: a network that is missing, has no card, or cannot be run.
     """
-    from uavdepth.depth_model import DepthModel
+    from uavdepth.model.depth_model import DepthModel
 
     wanted = settings.model
     try:

@@ -10,8 +10,8 @@ from service.frame import Frame
 from service.scale_status import ScaleStatus
 from service.telemetry import Telemetry
 from service.trouble import Trouble
-from uavdepth.depth_map import DepthMap
-from uavdepth.obstacle_scan import SECTOR_COUNT, ObstacleScan, SectorState, sector_bearings_deg
+from uavdepth.depth.depth_map import DepthMap
+from uavdepth.scan.obstacle_scan import SECTOR_COUNT, ObstacleScan, SectorState, sector_bearings_deg
 
 
 @dataclass(frozen=True)

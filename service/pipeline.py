@@ -24,13 +24,13 @@ from service.telemetry import Telemetry
 from service.trouble import Trouble
 from uavdepth.attitude import Attitude
 from uavdepth.errors import ImageMaskError, UavDepthError
-from uavdepth.model_card import ModelCard
-from uavdepth.obstacle_scan import ObstacleScan, SectorState
-from uavdepth.scan_memory import ScanMemory
-from uavdepth.scan_motion import PlanarPose
+from uavdepth.model.card import ModelCard
+from uavdepth.scan.memory import ScanMemory
+from uavdepth.scan.motion import PlanarPose
+from uavdepth.scan.obstacle_scan import ObstacleScan, SectorState
 
 if TYPE_CHECKING:
-    from uavdepth.model_card import ModelCard
+    from uavdepth.model.card import ModelCard
 
 __all__ = ["DepthSource", "Perception", "PerceptionResult", "ScaleSource", "Scanner", "unknown_scan"]
 
@@ -97,7 +97,7 @@ class Perception:
             ConfigError: a network that is missing, has no card or cannot be run, or a mask that does not
                 fit the camera.
         """
-        from uavdepth.scale_estimator import ScaleEstimator
+        from uavdepth.scale.estimator import ScaleEstimator
 
         model = load_network(settings)
         card = model.card
@@ -118,7 +118,7 @@ class Perception:
         Raises:
             ConfigError: a mask that does not fit the camera.
         """
-        from uavdepth.scale_estimator import ScaleEstimator
+        from uavdepth.scale.estimator import ScaleEstimator
 
         scale = self._scale
         if scale is not None:
@@ -208,8 +208,8 @@ def make_scanner(settings: Settings) -> Scanner:
     Raises:
         ConfigError: a mask that cannot be read or does not fit the camera.
     """
-    from uavdepth.image_mask import load_image_mask
-    from uavdepth.scanner import ObstacleScanner
+    from uavdepth.scan.image_mask import load_image_mask
+    from uavdepth.scan.scanner import ObstacleScanner
 
     camera, scan, mask = settings.camera.model, settings.scan, None
     if settings.camera.mask is not None:

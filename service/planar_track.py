@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from service.telemetry import Telemetry
-from uavdepth.scan_motion import PlanarPose
+from uavdepth.scan.motion import PlanarPose
 
 _LONGEST_GAP_NS = 500_000_000
 """No scan is remembered for longer."""

@@ -13,9 +13,9 @@ from service.perception_result import PerceptionResult
 from service.pipeline import pose_of
 from service.settings import Settings
 from service.telemetry import Telemetry
-from uavdepth.obstacle_scan import ObstacleScan
-from uavdepth.scan_merge import merge_scans
-from uavdepth.scan_motion import moved_scan
+from uavdepth.scan.merge import merge_scans
+from uavdepth.scan.motion import moved_scan
+from uavdepth.scan.obstacle_scan import ObstacleScan
 
 log = structlog.get_logger()
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from service.telemetry import Telemetry
-from uavdepth.ground_scale import MIN_HEIGHT_M
+from uavdepth.scale.ground_scale import MIN_HEIGHT_M
 
 HeightSource = Literal["rangefinder", "ekf", "both"]
 

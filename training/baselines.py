@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from training.metrics import DEPTH_CAP_M
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
-from uavdepth.hints import PointHints
+from uavdepth.model.hints import PointHints
 
 TRAINING_MEDIAN_DEPTH_M = 12.1
 """Median depth nearer than 80 m of 480 of the training frames of the network that ships, 80 of each scene,

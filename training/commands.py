@@ -20,7 +20,7 @@ from training.train_command import train
 if TYPE_CHECKING:
     from training.checkpoint import Checkpoint
     from training.doubt_calibration import DoubtCalibration
-    from uavdepth.model_card import ModelCard
+    from uavdepth.model.card import ModelCard
 
 __all__ = ["evaluate", "export", "train"]
 
@@ -102,7 +102,7 @@ def _calibrated(
         from training.doubt_calibration import calibrate_doubt
         from training.evaluation_frames import EvaluationPlan, parse_seeds
         from training.export import export_checkpoint
-        from uavdepth.depth_model import DepthModel
+        from uavdepth.model.depth_model import DepthModel
         from uavdepth.scenes import HELD_OUT_SCENES, SCENE_NAMES
 
     scenes = tuple(scene for scene in SCENE_NAMES if scene not in HELD_OUT_SCENES)

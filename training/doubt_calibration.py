@@ -13,7 +13,7 @@ from training.errors import EvaluationError
 from training.evaluation_doubt import NOMINAL_COVERAGE, SIGMAS, doubt_errors
 from training.evaluation_frames import EvaluationPlan
 from training.evaluation_knowledge import HintMode, hint_modes, vehicle_knowledge
-from uavdepth.depth_model import DepthModel
+from uavdepth.model.depth_model import DepthModel
 
 _NOMINAL = NOMINAL_COVERAGE[SIGMAS.index(1.0)]
 

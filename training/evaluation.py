@@ -17,7 +17,7 @@ from training.evaluation_sheet import SheetRow
 from training.evaluation_sky import SkyErrors, sky_errors
 from training.evaluation_sources import PERFECT, Answer, Sources
 from training.metrics import measurable, median_factor
-from uavdepth.scanner import ObstacleScanner
+from uavdepth.scan.scanner import ObstacleScanner
 
 
 @dataclass(frozen=True)

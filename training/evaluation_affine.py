@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uavdepth.camera import CameraModel
-from uavdepth.depth_map import DepthMap
-from uavdepth.hints import PointHints
+from uavdepth.depth.depth_map import DepthMap
+from uavdepth.model.hints import PointHints
 
 _ROUNDS = 4
 _GATE = 3.0

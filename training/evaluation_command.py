@@ -76,7 +76,7 @@ def evaluate(
     with needs_extra("evaluate", "sim"):
         from training.evaluation_run import evaluate_kitti, evaluate_rendered
         from training.evaluation_sheet import write_sheet
-        from uavdepth.depth_model import DepthModel
+        from uavdepth.model.depth_model import DepthModel
 
     counts = parse_points(points or (_DEFAULT_POINTS if kitti is None else _DEFAULT_KITTI_POINTS))
     if kitti is None:

@@ -17,7 +17,7 @@ from training.sequences.garg_crop import garg_mask
 from training.sequences.kitti_raw import KittiDrive
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
-from uavdepth.hints import PointHints
+from uavdepth.model.hints import PointHints
 
 CAMERA_HEIGHT_M = 1.65
 """Of the colour cameras above the road (Geiger et al. 2013, figure 3); the road is taken as level."""

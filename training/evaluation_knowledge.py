@@ -15,8 +15,8 @@ from training.errors import EvaluationError
 from training.evaluation_frames import EvaluationFrame
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
-from uavdepth.hint_planes import MOST_POINTS
-from uavdepth.hints import GroundHint, Hints, PointHints
+from uavdepth.model.hint_planes import MOST_POINTS
+from uavdepth.model.hints import GroundHint, Hints, PointHints
 
 TILT_SIGMA_RAD = math.radians(0.5)
 """Standard deviation of the error of roll and of pitch at the moment of the picture."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uavdepth.obstacle_scan import ObstacleScan, SectorState
+from uavdepth.scan.obstacle_scan import ObstacleScan, SectorState
 
 MEASURED_M = (2.0, 20.0)
 """Elements whose true nearest obstacle lies in this span are measured."""

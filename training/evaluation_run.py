@@ -19,7 +19,7 @@ from training.evaluation_sources import Sources
 from training.metrics import DEPTH_CAP_M
 from training.sequences.errors import BrokenFrameError
 from training.sequences.kitti_raw import open_kitti_raw
-from uavdepth.depth_model import DepthModel
+from uavdepth.model.depth_model import DepthModel
 
 SHEET_ROWS = 24
 KITTI_SHEET_ROWS = 10

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from training.errors import EvaluationError
 from training.metrics import DEPTH_CAP_M, measurable
-from uavdepth.depth_colors import UNKNOWN_BGR, colorize_depth
+from uavdepth.depth.colors import UNKNOWN_BGR, colorize_depth
 
 _PANEL_WIDTH_PX = 320
 _CAPTION_PX = 22

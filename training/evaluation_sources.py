@@ -13,9 +13,9 @@ from training.baselines import constant_depth, flat_ground_depth, nearest_point_
 from training.evaluation_affine import fit_to_points, fit_to_truth
 from training.evaluation_knowledge import HintMode, Knowledge, hint_modes, points_ratio
 from uavdepth.camera import CameraModel
-from uavdepth.depth_model import DepthModel
-from uavdepth.ground_scale import GroundScaler
-from uavdepth.hints import PointHints
+from uavdepth.model.depth_model import DepthModel
+from uavdepth.model.hints import PointHints
+from uavdepth.scale.ground_scale import GroundScaler
 
 CONSTANT = "constant depth"
 FLAT_GROUND = "flat ground"

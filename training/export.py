@@ -21,8 +21,8 @@ from training.half_weights import rounded_network, store_in_half
 from training.networks.depth_network import DepthNetwork
 from training.normalization import FOCAL_REFERENCE_PX, IMAGE_MEAN, IMAGE_STD, MAX_DEPTH_M
 from training.onnx_file import trace, write_checked
-from uavdepth.depth_model import DepthModel
-from uavdepth.model_card import ModelCard
+from uavdepth.model.card import ModelCard
+from uavdepth.model.depth_model import DepthModel
 
 LARGEST_DIFFERENCE = 1e-3
 """Of log inverse depth between PyTorch and ONNX Runtime: 0.1 % of depth."""

@@ -13,7 +13,7 @@ import onnx
 import torch
 from torch import Tensor, nn
 
-from uavdepth.model_card import CARD_METADATA_KEY, ModelCard
+from uavdepth.model.card import CARD_METADATA_KEY, ModelCard
 
 OPSET = 18
 """The first with the Pad and ReduceMean that PyTorch writes; ONNX Runtime knows it since 1.14 (2023)."""

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
-from uavdepth.depth_codec import decode_depth_png, encode_depth_png
-from uavdepth.depth_colors import colorize_depth
-from uavdepth.depth_map import DepthMap
-from uavdepth.depth_picture import DepthPictureInfo
+from uavdepth.depth.codec import decode_depth_png, encode_depth_png
+from uavdepth.depth.colors import colorize_depth
+from uavdepth.depth.depth_map import DepthMap
+from uavdepth.depth.picture import DepthPictureInfo
 from uavdepth.errors import (
     CameraModelError,
     DepthCodecError,
@@ -31,22 +31,22 @@ from uavdepth.errors import (
     SceneError,
     UavDepthError,
 )
-from uavdepth.ground_scale import GroundScale, GroundScaler, vertical_height_m
-from uavdepth.hints import GroundHint, Hints, PointHints
-from uavdepth.image_mask import load_image_mask
-from uavdepth.motion_points import MotionPoints, MotionPointSettings
-from uavdepth.obstacle_message import encode_obstacle_distance, obstacle_words
-from uavdepth.obstacle_scan import ObstacleScan, SectorState
-from uavdepth.scale_estimator import ScaleEstimate, ScaleEstimator
-from uavdepth.scan_memory import ScanMemory
-from uavdepth.scan_merge import merge_scans
-from uavdepth.scan_motion import PlanarPose, moved_scan
-from uavdepth.scanner import ObstacleScanner
-from uavdepth.vehicle_motion import MotionNoise, VehicleMotion
+from uavdepth.messages.obstacle_distance import encode_obstacle_distance, obstacle_words
+from uavdepth.model.hints import GroundHint, Hints, PointHints
+from uavdepth.motion.motion_points import MotionPoints, MotionPointSettings
+from uavdepth.motion.vehicle_motion import MotionNoise, VehicleMotion
+from uavdepth.scale.estimator import ScaleEstimate, ScaleEstimator
+from uavdepth.scale.ground_scale import GroundScale, GroundScaler, vertical_height_m
+from uavdepth.scan.image_mask import load_image_mask
+from uavdepth.scan.memory import ScanMemory
+from uavdepth.scan.merge import merge_scans
+from uavdepth.scan.motion import PlanarPose, moved_scan
+from uavdepth.scan.obstacle_scan import ObstacleScan, SectorState
+from uavdepth.scan.scanner import ObstacleScanner
 
 if TYPE_CHECKING:
-    from uavdepth.depth_model import DepthModel
-    from uavdepth.model_card import ModelCard
+    from uavdepth.model.card import ModelCard
+    from uavdepth.model.depth_model import DepthModel
 
 __all__ = [
     "Attitude",
@@ -96,11 +96,11 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     """Names whose modules are heavy (pydantic) are imported when they are first asked for."""
     if name == "DepthModel":
-        from uavdepth.depth_model import DepthModel
+        from uavdepth.model.depth_model import DepthModel
 
         return DepthModel
     if name == "ModelCard":
-        from uavdepth.model_card import ModelCard
+        from uavdepth.model.card import ModelCard
 
         return ModelCard
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

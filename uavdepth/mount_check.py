@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uavdepth.camera import BODY_FROM_CAMERA_AXES, CameraMount
-from uavdepth.ground_plane import GroundPlane
+from uavdepth.scale.ground_plane import GroundPlane
 
 DIFFERENCE_DEG = 2.0
 """Mounts that differ by more are reported: at 10 m, 2 degrees are 0.35 m of height."""

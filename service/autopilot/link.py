@@ -21,7 +21,7 @@ from service.clock import Clock
 from service.errors import LinkError
 from service.settings.autopilot import AutopilotSettings
 from service.telemetry import Telemetry
-from uavdepth.obstacle_scan import ObstacleScan
+from uavdepth.scan.obstacle_scan import ObstacleScan
 
 _TICK_S = 0.02
 _RETRY_S = 0.5

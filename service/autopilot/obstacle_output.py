@@ -17,9 +17,9 @@ from service.autopilot.scan_delivery import ScanDelivery
 from service.autopilot.telemetry_tracker import TelemetryTracker
 from service.autopilot.transport_delay import TransportDelay
 from service.settings.autopilot import AutopilotSettings
-from uavdepth.autopilot_profile import AutopilotProfile
-from uavdepth.obstacle_message import obstacle_words
-from uavdepth.obstacle_scan import ObstacleScan
+from uavdepth.messages.autopilot_profile import AutopilotProfile
+from uavdepth.messages.obstacle_distance import obstacle_words
+from uavdepth.scan.obstacle_scan import ObstacleScan
 
 _REMEMBERED_DELAYS = 450
 """Half a minute of messages at 15 Hz."""

@@ -17,10 +17,10 @@ from service.autopilot.byte_budget import (
 from service.autopilot.obstacle_gate import ObstacleGate, Refusal
 from service.settings.autopilot import AutopilotSettings
 from uavdepth.attitude import Attitude
-from uavdepth.autopilot_profile import AutopilotProfile
-from uavdepth.obstacle_message import encode_obstacle_distance
-from uavdepth.obstacle_points import encode_obstacle_points
-from uavdepth.obstacle_scan import ObstacleScan
+from uavdepth.messages.autopilot_profile import AutopilotProfile
+from uavdepth.messages.obstacle_distance import encode_obstacle_distance
+from uavdepth.messages.obstacle_points import encode_obstacle_points
+from uavdepth.scan.obstacle_scan import ObstacleScan
 
 _FEWEST_POINTS = 24
 """The elements of a camera that sees 120 degrees: with fewer points a wide obstacle would have holes."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from uavdepth.autopilot_profile import ARDUPILOT, PROFILES, PX4, PX4_LEGACY, AutopilotProfile
+from uavdepth.messages.autopilot_profile import ARDUPILOT, PROFILES, PX4, PX4_LEGACY, AutopilotProfile
 
 AUTO = "auto"
 

@@ -10,8 +10,8 @@ import numpy as np
 from service.autopilot.telemetry_tracker import TelemetryTracker
 from service.autopilot.transport_delay import TransportDelay
 from uavdepth.attitude import Attitude
-from uavdepth.obstacle_scan import ObstacleScan, SectorState
-from uavdepth.scan_motion import PlanarPose, moved_scan
+from uavdepth.scan.motion import PlanarPose, moved_scan
+from uavdepth.scan.obstacle_scan import ObstacleScan, SectorState
 
 _NO_TURN_RAD = math.radians(0.5)
 """Attitude at capture is known no better: a turn below it would only widen obstacles."""

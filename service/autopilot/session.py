@@ -33,7 +33,7 @@ from service.autopilot.transport_delay import TransportDelay
 from service.autopilot.vehicle import Hearing, VehicleLearner
 from service.settings.autopilot import AutopilotSettings
 from service.telemetry import Telemetry
-from uavdepth.obstacle_scan import ObstacleScan
+from uavdepth.scan.obstacle_scan import ObstacleScan
 
 _SHORT_LIVED_NS = 1_000_000_000
 """A HEARTBEAT, TIMESYNC or request that could not leave for a second is made anew."""

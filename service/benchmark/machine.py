@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import platform
 
-from uavdepth.providers import CPU_INFO
+from uavdepth.model.providers import CPU_INFO
 
 
 def machine_name() -> str:

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from service.benchmark.pictures import CAMERA, HEIGHT_M, LEVEL, MOUNT
 from service.benchmark.reference import BASELINE, PAPER_NETWORK, ReferenceUnavailableError, write_reference
-from uavdepth.depth_model import DepthModel
 from uavdepth.errors import ModelFileError
-from uavdepth.hints import GroundHint, Hints
-from uavdepth.inference import InferenceSession, open_session
-from uavdepth.model_card import ModelCard
-from uavdepth.network_file import WEIGHTS_FOLDER, shipped_networks
-from uavdepth.providers import PROVIDERS
+from uavdepth.model.card import ModelCard
+from uavdepth.model.depth_model import DepthModel
+from uavdepth.model.hints import GroundHint, Hints
+from uavdepth.model.inference import InferenceSession, open_session
+from uavdepth.model.network_file import WEIGHTS_FOLDER, shipped_networks
+from uavdepth.model.providers import PROVIDERS
 
 SIZES = ((384, 192), (640, 320))
 _WARM_UP = 3

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from pathlib import Path
 
-from uavdepth.model_card import ModelCard
+from uavdepth.model.card import ModelCard
 
 PAPER_NETWORK = "bl+fan+eca"
 BASELINE = "monodepth2"

@@ -19,13 +19,13 @@ from service.network import answers_in_metres, network_kind
 from service.pipeline import Perception
 from service.settings import Settings
 from service.telemetry import Telemetry
-from uavdepth.depth_codec import encode_depth_png
-from uavdepth.depth_model import DepthModel
-from uavdepth.ground_scale import GroundScaler
-from uavdepth.inference import InferenceSession, open_session
-from uavdepth.obstacle_message import encode_obstacle_distance
-from uavdepth.scale_estimator import METRIC_FACTORS, ScaleEstimator
-from uavdepth.scanner import ObstacleScanner
+from uavdepth.depth.codec import encode_depth_png
+from uavdepth.messages.obstacle_distance import encode_obstacle_distance
+from uavdepth.model.depth_model import DepthModel
+from uavdepth.model.inference import InferenceSession, open_session
+from uavdepth.scale.estimator import METRIC_FACTORS, ScaleEstimator
+from uavdepth.scale.ground_scale import GroundScaler
+from uavdepth.scan.scanner import ObstacleScanner
 
 _WARM_UP = 3
 _NEAR_M, _FAR_M = 0.5, 60.0

@@ -20,7 +20,7 @@ from service.publisher import keys
 from service.publisher.session import Role, open_session
 from service.publisher.topics import PictureTopics, ScanTopics
 from service.publisher.wire import CameraHeader, Intrinsics, ScanSample
-from uavdepth.obstacle_scan import ObstacleScan, SectorState, sector_bearings_deg
+from uavdepth.scan.obstacle_scan import ObstacleScan, SectorState, sector_bearings_deg
 
 SCAN_HZ = 15.0
 _PICTURE_EVERY = 3

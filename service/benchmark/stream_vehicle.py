@@ -23,9 +23,9 @@ from service.publisher.publisher import ZenohPublisher
 from service.publisher.wire import ScanSample, StatusSample
 from service.settings.zenoh import ZenohSettings
 from service.telemetry import Telemetry
-from uavdepth.depth_codec import encode_depth_png
-from uavdepth.depth_map import DepthMap
-from uavdepth.scanner import ObstacleScanner
+from uavdepth.depth.codec import encode_depth_png
+from uavdepth.depth.depth_map import DepthMap
+from uavdepth.scan.scanner import ObstacleScanner
 from uavdepth.scenes import load_scene
 
 FPS = 15.0

@@ -23,7 +23,7 @@ from service.fake_autopilot.fake_autopilot import FakeAutopilot, Truth
 from service.fake_autopilot.pilot import Pilot, PilotError
 from service.publisher.wire import ScanSample
 from uavdepth.errors import UavDepthError
-from uavdepth.obstacle_scan import SectorState
+from uavdepth.scan.obstacle_scan import SectorState
 from uavdepth.scenes import load_scene, parse_scene
 
 SERVICE_TIMEOUT_S = 180.0

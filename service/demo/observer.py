@@ -17,7 +17,7 @@ from service.publisher.session import station_session
 from service.publisher.wire import DepthHeader, ScanSample, StatusSample, WireError
 from service.watch.board import Board, VehicleView
 from service.watch.listener import Listener
-from uavdepth.depth_codec import decode_depth_png
+from uavdepth.depth.codec import decode_depth_png
 from uavdepth.errors import DepthCodecError
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.demo.radar import BACKGROUND_BGR, TEXT_BGR, draw_radar
-from uavdepth.depth_colors import colorize_depth
-from uavdepth.obstacle_scan import ObstacleScan
+from uavdepth.depth.colors import colorize_depth
+from uavdepth.scan.obstacle_scan import ObstacleScan
 
 PANEL_WIDTH_PX, PANEL_HEIGHT_PX = 576, 360
 """The shape of the demo's camera; pictures that fit a thin link keep it by a pixel or so only."""

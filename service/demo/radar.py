@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from uavdepth.obstacle_scan import SECTOR_WIDTH_DEG, ObstacleScan, SectorState
+from uavdepth.scan.obstacle_scan import SECTOR_WIDTH_DEG, ObstacleScan, SectorState
 
 BACKGROUND_BGR = (32, 28, 26)
 RING_BGR = (88, 82, 78)

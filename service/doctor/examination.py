@@ -19,8 +19,8 @@ from service.doctor.parameter_names import PARAMETERS
 from service.doctor.parameter_reader import ParameterReader
 from service.doctor.probe import ObstacleProbe
 from service.settings.autopilot import AutopilotSettings
-from uavdepth.obstacle_message import encode_obstacle_distance
-from uavdepth.obstacle_scan import SECTOR_COUNT, ObstacleScan, SectorState, sector_bearings_deg
+from uavdepth.messages.obstacle_distance import encode_obstacle_distance
+from uavdepth.scan.obstacle_scan import SECTOR_COUNT, ObstacleScan, SectorState, sector_bearings_deg
 
 _ASK_AGAIN_NS = 500_000_000
 _PROBE_LIFE_NS = 50_000_000

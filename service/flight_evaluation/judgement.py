@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.flight_evaluation.truth import TrueElements
-from uavdepth.obstacle_scan import ObstacleScan, SectorState
+from uavdepth.scan.obstacle_scan import ObstacleScan, SectorState
 
 MEASURED_M = (2.0, 20.0)
 """Elements whose nearest true obstacle lies in this span are measured."""

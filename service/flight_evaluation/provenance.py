@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 
 from service.flight_evaluation.evaluation import Evaluation
 from service.flight_evaluation.sight import DepthKind
-from uavdepth.depth_model import DepthModel
+from uavdepth.model.depth_model import DepthModel
 
 
 def today() -> str:

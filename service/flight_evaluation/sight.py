@@ -13,8 +13,8 @@ from service.pipeline import Perception, make_scanner
 from service.settings import Settings
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
-from uavdepth.depth_map import DepthMap
-from uavdepth.hints import Hints
+from uavdepth.depth.depth_map import DepthMap
+from uavdepth.model.hints import Hints
 from uavdepth.scenes import Scene
 
 _TRUE_SIGMA = 0.01

@@ -18,7 +18,7 @@ from service.pipeline import PerceptionResult
 from service.settings import Settings
 from service.telemetry import Telemetry
 from uavdepth.errors import UavDepthError
-from uavdepth.obstacle_scan import SectorState
+from uavdepth.scan.obstacle_scan import SectorState
 from uavdepth.scenes import Scene
 from uavdepth.scenes.flight import Pose
 

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
-from uavdepth.level_ground import GROUND_DEPTH_SHARE, GROUND_SLOPE
-from uavdepth.obstacle_scan import SECTOR_COUNT, SECTOR_WIDTH_DEG, sector_bearings_deg
-from uavdepth.sloping_ground import FLIGHT_CLEARANCE_M
+from uavdepth.scan.level_ground import GROUND_DEPTH_SHARE, GROUND_SLOPE
+from uavdepth.scan.obstacle_scan import SECTOR_COUNT, SECTOR_WIDTH_DEG, sector_bearings_deg
+from uavdepth.scan.sloping_ground import FLIGHT_CLEARANCE_M
 
 FARTHEST_M = 30.0
 """Truth reaches so far: a report of 19 m for a thing at 21 m is no false one."""

@@ -15,7 +15,7 @@ from service.flight_evaluation.lockstep import Lockstep
 from service.flight_evaluation.routes import Route
 from service.flight_evaluation.sight import Eyes
 from service.settings import Settings
-from uavdepth.obstacle_scan import SECTOR_WIDTH_DEG
+from uavdepth.scan.obstacle_scan import SECTOR_WIDTH_DEG
 from uavdepth.scenes import Scene
 
 _STEP_DEG = 0.5

@@ -52,7 +52,7 @@ def evaluate_motion(
         raise ConfigError("nothing to evaluate: give --flights, --log FILE or --kitti FOLDER")
     network = None
     if model != "none":
-        from uavdepth.depth_model import DepthModel
+        from uavdepth.model.depth_model import DepthModel
 
         network = DepthModel.load(model)
     groups, rows = dict[str, Errors](), dict[str, GroupSummary]()

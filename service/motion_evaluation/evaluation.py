@@ -15,12 +15,12 @@ from service.motion_evaluation.journey import Journey, Moment
 from service.motion_evaluation.point_errors import PointErrors
 from service.motion_evaluation.scale_errors import SETTLED_S, SHORT_DRIVE_S, ScaleErrors
 from service.motion_evaluation.unitless import UNIT_M, UnitlessTruth
-from uavdepth.depth_map import DepthMap
-from uavdepth.depth_model import DepthModel
-from uavdepth.hints import Hints, PointHints
-from uavdepth.motion_points import MotionPoints
-from uavdepth.scale_estimator import ScaleEstimator, apply
-from uavdepth.vehicle_motion import VehicleMotion
+from uavdepth.depth.depth_map import DepthMap
+from uavdepth.model.depth_model import DepthModel
+from uavdepth.model.hints import Hints, PointHints
+from uavdepth.motion.motion_points import MotionPoints
+from uavdepth.motion.vehicle_motion import VehicleMotion
+from uavdepth.scale.estimator import ScaleEstimator, apply
 
 SourceSet = Literal["points", "ground", "both"]
 SOURCE_SETS: tuple[SourceSet, ...] = ("both", "points", "ground")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
-from uavdepth.hints import GroundHint
+from uavdepth.model.hints import GroundHint
 
 
 @dataclass(frozen=True, eq=False)

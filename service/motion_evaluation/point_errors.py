@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from uavdepth.hints import PointHints
+from uavdepth.model.hints import PointHints
 
 NEAREST_M, FARTHEST_M = 5.0, 30.0
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from service.motion_evaluation.journey import Moment, Said
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
-from uavdepth.ground_scale import vertical_height_m
-from uavdepth.hints import GroundHint
+from uavdepth.model.hints import GroundHint
+from uavdepth.scale.ground_scale import vertical_height_m
 from uavdepth.scenes import Scene
 from uavdepth.scenes.flight import Pose
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from uavdepth.scale_estimator import ScaleEstimate
+from uavdepth.scale.estimator import ScaleEstimate
 
 MOVING_MPS = 1.0
 SETTLED_S = 3.0

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from uavdepth.depth_map import DepthMap
+from uavdepth.depth.depth_map import DepthMap
 
 UNIT_M = 3.7
 """One unit of such depth."""

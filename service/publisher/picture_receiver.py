@@ -13,7 +13,7 @@ from service.publisher import keys
 from service.publisher.received import ReceivedReporter
 from service.publisher.video import VideoDecoder, VideoHeader
 from service.publisher.wire import CameraHeader, DepthHeader, Stamp, WireError
-from uavdepth.depth_codec import encode_codes_png
+from uavdepth.depth.codec import encode_codes_png
 from uavdepth.errors import DepthCodecError
 
 _HEADERS: dict[str, type[Stamp]] = {

@@ -16,7 +16,7 @@ from service.publisher.picture_size import FRAME_S, Ladder, camera_ladder, depth
 from service.publisher.video import VideoEncoder, VideoHeader
 from service.publisher.wire import CameraHeader, DepthHeader, Intrinsics, Stamp
 from service.settings.zenoh import ZenohSettings
-from uavdepth.depth_codec import depth_codes, encode_codes_png
+from uavdepth.depth.codec import depth_codes, encode_codes_png
 
 _VIDEO_SHARE = 0.5
 _MAX_VIDEO_BYTES_PER_S = 50_000.0

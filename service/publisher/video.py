@@ -30,7 +30,7 @@ class VideoHeader(Stamp):
     """Attachment of a video sample, whose payload is one H.264 access unit.
 
     Args:
-        encoding: luma is the code of `uavdepth.depth_codec`, altered by the codec: never fly by it.
+        encoding: luma is the code of `uavdepth.depth.codec`, altered by the codec: never fly by it.
         stream: changes when the vehicle starts its encoder anew.
         sequence: counts the stream's pictures; a gap makes everything up to the next key frame unreadable.
         is_key: readable on its own.

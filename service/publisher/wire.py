@@ -9,7 +9,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from service.errors import PublisherError
 from uavdepth.camera import CameraModel
-from uavdepth.obstacle_scan import (
+from uavdepth.scan.obstacle_scan import (
     FIRST_BEARING_DEG,
     SECTOR_COUNT,
     SECTOR_WIDTH_DEG,
@@ -117,7 +117,7 @@ class DepthHeader(Stamp):
     """Attachment of a depth sample, whose payload is the 8-bit logarithmic PNG.
 
     Args:
-        encoding: the codec, `uavdepth.depth_codec`.
+        encoding: the codec, `uavdepth.depth.codec`.
         near_m, far_m: ends of the logarithmic scale in metres.
         camera: the depth picture's camera.
         scale_factor: network units to metres.

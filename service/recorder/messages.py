@@ -32,7 +32,7 @@ from service.recorder.sigma_codes import sigma_codes
 from service.telemetry import Telemetry
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
-from uavdepth.obstacle_scan import ObstacleScan, SectorState
+from uavdepth.scan.obstacle_scan import ObstacleScan, SectorState
 
 _FLIP = np.diag([1.0, -1.0, -1.0])
 """Between forward-right-down and the viewers' forward-left-up."""

@@ -12,7 +12,7 @@ from service.perception_result import PerceptionResult
 from service.scale_status import ScaleStatus
 from service.telemetry import Telemetry
 from uavdepth.attitude import Attitude
-from uavdepth.obstacle_scan import SECTOR_COUNT, ObstacleScan, SectorState, sector_bearings_deg
+from uavdepth.scan.obstacle_scan import SECTOR_COUNT, ObstacleScan, SectorState, sector_bearings_deg
 
 _MAX_NOTE_BYTES = 65_536
 """Many times what a note takes: a longer one is not even parsed."""

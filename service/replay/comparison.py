@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.replay.golden import Golden, GoldenScan
-from uavdepth.obstacle_scan import SectorState, sector_bearings_deg
+from uavdepth.scan.obstacle_scan import SectorState, sector_bearings_deg
 
 _SHOWN = 12
 _LETTERS = {SectorState.UNKNOWN: "unknown", SectorState.CLEAR: "clear"}

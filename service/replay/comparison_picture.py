@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from service.errors import RecordError
 from service.replay.comparison import Comparison
 from service.replay.golden import Golden, GoldenScan
-from uavdepth.obstacle_scan import SECTOR_COUNT, SectorState, sector_bearings_deg
+from uavdepth.scan.obstacle_scan import SECTOR_COUNT, SectorState, sector_bearings_deg
 
 _FAR_M = 20.0
 _CELL = 6

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.recorder.perception_note import PerceptionNote
-from uavdepth.depth_map import DepthMap
+from uavdepth.depth.depth_map import DepthMap
 
 
 @dataclass(frozen=True)

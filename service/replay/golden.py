@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from service.errors import RecordError
 from service.replay.player import Replayed
-from uavdepth.obstacle_scan import SECTOR_COUNT, SectorState
+from uavdepth.scan.obstacle_scan import SECTOR_COUNT, SectorState
 
 FORMAT = 1
 _MAX_BYTES = 64 * 1024 * 1024

@@ -9,9 +9,9 @@ from service.errors import RecordError
 from service.pipeline import Perception, make_scanner
 from service.settings import Settings
 from uavdepth.camera import CameraModel
-from uavdepth.depth_map import DepthMap
-from uavdepth.hints import GroundHint, Hints, PointHints
-from uavdepth.scale_estimator import NetworkKind, ScaleEstimate
+from uavdepth.depth.depth_map import DepthMap
+from uavdepth.model.hints import GroundHint, Hints, PointHints
+from uavdepth.scale.estimator import NetworkKind, ScaleEstimate
 
 
 class RecordedDepth:

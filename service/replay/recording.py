@@ -16,7 +16,7 @@ from service.recorder.perception_note import PerceptionNote
 from service.recorder.record_reader import RecordReader
 from service.replay.footage import Packets, RecordedPicture
 from service.replay.recorded_images import depth_of, image_of, sigma_of
-from uavdepth.depth_map import DepthMap
+from uavdepth.depth.depth_map import DepthMap
 
 _MAX_MAVLINK_BYTES = 1024 * 1024 * 1024
 """A day of a fast line; a hostile file unpacks to many times its size."""

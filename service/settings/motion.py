@@ -7,7 +7,7 @@ import math
 from pydantic import Field
 
 from service.settings.section import Section
-from uavdepth.vehicle_motion import MotionNoise
+from uavdepth.motion.vehicle_motion import MotionNoise
 
 
 class MotionSettings(Section):

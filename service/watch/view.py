@@ -14,7 +14,7 @@ from rich.text import Text
 from service.freshness import Freshness
 from service.publisher.wire import ScanSample, StatusSample
 from service.watch.board import Board, VehicleView
-from uavdepth.obstacle_scan import SectorState
+from uavdepth.scan.obstacle_scan import SectorState
 
 _BLOCKS = " ▁▂▃▄▅▆▇█"
 _STATE_STYLES = {"ACTIVE": "green", "STANDBY": "yellow", "BOOT": "yellow", "CRITICAL": "bold red"}

@@ -23,9 +23,9 @@ from service.publisher.received import ReceivedReport
 from service.publisher.video import VideoEncoder, VideoHeader
 from service.publisher.wire import CameraHeader, DepthHeader, Intrinsics, ScanSample, StatusSample
 from service.watch.board import Board
-from uavdepth.depth_codec import decode_depth_png, encode_codes_png
+from uavdepth.depth.codec import decode_depth_png, encode_codes_png
 from uavdepth.errors import UavDepthError
-from uavdepth.obstacle_scan import ObstacleScan, SectorState, sector_bearings_deg
+from uavdepth.scan.obstacle_scan import ObstacleScan, SectorState, sector_bearings_deg
 
 CAMERA = Intrinsics(width=64, height=48, fx=50.0, fy=50.0, cx=31.5, cy=23.5)
 TOKENS = (

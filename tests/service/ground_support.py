@@ -24,8 +24,8 @@ from service.publisher import keys
 from service.publisher.session import open_session
 from service.publisher.wire import CameraHeader, DepthHeader, Intrinsics, ScanSample, StatusSample
 from uavdepth.camera import CameraModel
-from uavdepth.depth_codec import encode_depth_png
-from uavdepth.obstacle_scan import ObstacleScan, SectorState, sector_bearings_deg
+from uavdepth.depth.codec import encode_depth_png
+from uavdepth.scan.obstacle_scan import ObstacleScan, SectorState, sector_bearings_deg
 
 CAMERA = CameraModel.from_fov(64, 40, horizontal_fov_deg=90.0)
 MILLISECOND = 1_000_000

@@ -13,9 +13,9 @@ from service.frame import Frame
 from service.pipeline import Perception
 from service.telemetry import Telemetry
 from uavdepth.camera import CameraModel
-from uavdepth.depth_map import DepthMap
-from uavdepth.hints import Hints
-from uavdepth.scanner import ObstacleScanner
+from uavdepth.depth.depth_map import DepthMap
+from uavdepth.model.hints import Hints
+from uavdepth.scan.scanner import ObstacleScanner
 
 SETTINGS = make_settings()
 CAMERA, MOUNT = SETTINGS.camera.model, SETTINGS.mount.mount

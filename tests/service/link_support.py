@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from service.autopilot.session import LinkSession
 from service.settings.autopilot import AutopilotSettings
-from uavdepth.obstacle_scan import ObstacleScan, SectorState, sector_bearings_deg
+from uavdepth.scan.obstacle_scan import ObstacleScan, SectorState, sector_bearings_deg
 
 LOGS = Path(__file__).resolve().parents[2] / "sitl_logs"
 SECOND_NS = 1_000_000_000

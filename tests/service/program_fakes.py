@@ -25,9 +25,9 @@ from service.settings.load import load_settings
 from service.telemetry import Telemetry
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel
-from uavdepth.depth_map import DepthMap
-from uavdepth.hints import Hints
-from uavdepth.obstacle_scan import ObstacleScan
+from uavdepth.depth.depth_map import DepthMap
+from uavdepth.model.hints import Hints
+from uavdepth.scan.obstacle_scan import ObstacleScan
 
 WIDTH, HEIGHT = 160, 96
 LEVEL = Attitude(0.0, 0.0, 0.0)

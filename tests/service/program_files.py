@@ -10,7 +10,7 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper
 
-from uavdepth.model_card import CARD_METADATA_KEY
+from uavdepth.model.card import CARD_METADATA_KEY
 
 SIZE = "width = 160\nheight = 96\nhorizontal_fov_deg = 80\n"
 

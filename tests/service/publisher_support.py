@@ -17,7 +17,7 @@ from service.scale_status import ScaleStatus
 from service.settings import Settings
 from service.telemetry import Telemetry
 from service.trouble import Trouble
-from uavdepth.depth_map import DepthMap
+from uavdepth.depth.depth_map import DepthMap
 
 
 def settings_on(port: int, *overrides: str) -> Settings:

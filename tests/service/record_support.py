@@ -17,8 +17,8 @@ from service.recorder.recorder import Recorder
 from service.scale_status import ScaleStatus
 from service.settings import Settings
 from service.telemetry import Telemetry
-from uavdepth.depth_map import DepthMap
-from uavdepth.obstacle_scan import SECTOR_COUNT, ObstacleScan, SectorState, sector_bearings_deg
+from uavdepth.depth.depth_map import DepthMap
+from uavdepth.scan.obstacle_scan import SECTOR_COUNT, ObstacleScan, SectorState, sector_bearings_deg
 
 WALL_NS = 1_800_000_000_000_000_000
 SECOND_NS = 1_000_000_000

@@ -21,8 +21,8 @@ from service.clock import MonotonicClock
 from service.pipeline import Perception
 from service.run import Service
 from service.settings import Settings
-from uavdepth.scale_estimator import ScaleEstimator
-from uavdepth.scanner import ObstacleScanner
+from uavdepth.scale.estimator import ScaleEstimator
+from uavdepth.scan.scanner import ObstacleScanner
 
 SETTINGS = make_settings()
 WALL_M = 8.0

@@ -22,10 +22,10 @@ from service.benchmark.networks import NetworkSpeed, NetworkSpeeds, measure_netw
 from service.benchmark.reference import BASELINE, PAPER_NETWORK, ReferenceUnavailableError, write_reference
 from service.benchmark.stages import measure_stages
 from uavdepth.camera import CameraModel
-from uavdepth.depth_model import DepthModel
-from uavdepth.inference import open_session
-from uavdepth.model_card import CARD_METADATA_KEY, ModelCard
-from uavdepth.providers import PROVIDERS
+from uavdepth.model.card import CARD_METADATA_KEY, ModelCard
+from uavdepth.model.depth_model import DepthModel
+from uavdepth.model.inference import open_session
+from uavdepth.model.providers import PROVIDERS
 
 
 @pytest.fixture(scope="module")

@@ -30,8 +30,8 @@ from service.publisher.session import open_session
 from service.publisher.wire import CameraHeader, DepthHeader, Intrinsics, ScanSample
 from service.settings.load import load_settings
 from uavdepth.camera import CameraModel
-from uavdepth.depth_codec import encode_depth_png
-from uavdepth.obstacle_scan import ObstacleScan, SectorState, sector_bearings_deg
+from uavdepth.depth.codec import encode_depth_png
+from uavdepth.scan.obstacle_scan import ObstacleScan, SectorState, sector_bearings_deg
 
 PLAN = DemoPlan("wall:1000", "ardupilot", False, 3.0, 3.0, 30.0, "default")
 REPORT = DemoReport(

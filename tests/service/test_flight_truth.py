@@ -18,7 +18,7 @@ from service.flight_evaluation.sight import Camera, DepthKind
 from service.flight_evaluation.truth import HeightBand, TrueElements, TruthFinder
 from service.pipeline import make_scanner
 from uavdepth.attitude import Attitude
-from uavdepth.obstacle_scan import ObstacleScan, SectorState, sector_bearings_deg
+from uavdepth.scan.obstacle_scan import ObstacleScan, SectorState, sector_bearings_deg
 from uavdepth.scenes import Scene
 
 LEVEL = Attitude(0.0, 0.0, 0.0)

@@ -29,11 +29,11 @@ from service.pipeline import Perception
 from service.run import Service
 from service.settings import Settings
 from uavdepth.camera import CameraModel
-from uavdepth.depth_map import DepthMap
+from uavdepth.depth.depth_map import DepthMap
 from uavdepth.errors import ModelFileError
-from uavdepth.hints import Hints
-from uavdepth.obstacle_scan import ObstacleScan
-from uavdepth.scanner import ObstacleScanner
+from uavdepth.model.hints import Hints
+from uavdepth.scan.obstacle_scan import ObstacleScan
+from uavdepth.scan.scanner import ObstacleScanner
 
 SETTINGS = make_settings()
 DEADLINE_NS = 300_000_000

@@ -13,8 +13,8 @@ from service.fake_autopilot.ardupilot import ArduPilot
 from service.fake_autopilot.controller import Sticks
 from service.fake_autopilot.obstacle_words import ObstacleWords
 from uavdepth import ObstacleScan, SectorState, encode_obstacle_distance
-from uavdepth.obstacle_scan import sector_bearings_deg
-from uavdepth.scan_motion import moved_scan
+from uavdepth.scan.motion import moved_scan
+from uavdepth.scan.obstacle_scan import sector_bearings_deg
 
 WALL = Wall(north_m=40.0)
 LATE_S = 0.3

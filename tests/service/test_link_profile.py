@@ -14,7 +14,7 @@ from service.fake_autopilot.autopilot import SimulatedAutopilot, make_controller
 from service.fake_autopilot.obstacle_map_px4 import ObstacleMap
 from service.fake_autopilot.obstacle_words import ObstacleWords
 from uavdepth import SectorState, encode_obstacle_distance
-from uavdepth.autopilot_profile import PROFILES
+from uavdepth.messages.autopilot_profile import PROFILES
 
 S, MS = 1_000_000_000, 1_000_000
 ARDUPILOT, PX4 = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, mavlink.MAV_AUTOPILOT_PX4

@@ -19,11 +19,11 @@ from service.settings import MotionSettings
 from service.telemetry import Telemetry
 from service.trouble import Trouble
 from uavdepth.camera import CameraModel
-from uavdepth.depth_map import DepthMap
-from uavdepth.hints import Hints, PointHints
-from uavdepth.motion_points import MotionPoints
-from uavdepth.scale_estimator import ScaleEstimator
-from uavdepth.scanner import ObstacleScanner
+from uavdepth.depth.depth_map import DepthMap
+from uavdepth.model.hints import Hints, PointHints
+from uavdepth.motion.motion_points import MotionPoints
+from uavdepth.scale.estimator import ScaleEstimator
+from uavdepth.scan.scanner import ObstacleScanner
 
 SETTINGS = make_settings("camera.width=320", "camera.height=200")
 CAMERA, MOUNT = SETTINGS.camera.model, SETTINGS.mount.mount

@@ -13,7 +13,7 @@ from onnx import TensorProto, helper, numpy_helper
 from typer.testing import CliRunner, Result
 
 from service.model_command import model_app
-from uavdepth.model_card import CARD_METADATA_KEY
+from uavdepth.model.card import CARD_METADATA_KEY
 
 CARD: dict[str, Any] = {
     "card_version": 2,

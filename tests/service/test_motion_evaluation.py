@@ -23,7 +23,7 @@ from service.motion_evaluation.scale_errors import ScaleErrors
 from service.motion_evaluation.summary import GroupSummary, targets
 from service.motion_evaluation.unitless import UNIT_M, UnitlessTruth
 from uavdepth import Attitude, CameraModel, CameraMount, GroundHint, PointHints
-from uavdepth.scale_estimator import ScaleEstimate
+from uavdepth.scale.estimator import ScaleEstimate
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "uavdepth"))
 from moving_camera import LEVEL, wall_picture

@@ -14,7 +14,7 @@ from service.mount_watch import MountWatch
 from service.telemetry import Telemetry
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraMount
-from uavdepth.depth_map import DepthMap
+from uavdepth.depth.depth_map import DepthMap
 from uavdepth.mount_check import MountState
 
 SETTINGS = make_settings("mount.pitch_deg=-15", "mount.check_every_s=2")

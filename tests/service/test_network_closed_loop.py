@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from service.fake_autopilot.autopilot import Flavor
-from uavdepth.depth_model import WEIGHTS_FOLDER
+from uavdepth.model.depth_model import WEIGHTS_FOLDER
 
 pytest.importorskip("embreex", reason="rendered worlds need the extra sim")
 from service.flight_evaluation.closed_loop import Flown, Outcome, fly_route

@@ -33,9 +33,9 @@ from service.run import Service
 from service.settings import Settings
 from service.trouble import Trouble
 from uavdepth.camera import CameraModel
-from uavdepth.depth_map import DepthMap
-from uavdepth.hints import Hints
-from uavdepth.scanner import ObstacleScanner
+from uavdepth.depth.depth_map import DepthMap
+from uavdepth.model.hints import Hints
+from uavdepth.scan.scanner import ObstacleScanner
 
 LAST_MESSAGE_NS = 10 * S
 

@@ -18,12 +18,12 @@ from service.telemetry import Telemetry
 from service.trouble import Trouble
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel
-from uavdepth.depth_map import DepthMap
+from uavdepth.depth.depth_map import DepthMap
 from uavdepth.errors import ImageSizeError
-from uavdepth.hints import Hints
-from uavdepth.obstacle_scan import SectorState
-from uavdepth.scale_estimator import NetworkKind, ScaleEstimator
-from uavdepth.scanner import ObstacleScanner
+from uavdepth.model.hints import Hints
+from uavdepth.scale.estimator import NetworkKind, ScaleEstimator
+from uavdepth.scan.obstacle_scan import SectorState
+from uavdepth.scan.scanner import ObstacleScanner
 
 SETTINGS = make_settings()
 CAMERA = SETTINGS.camera.model

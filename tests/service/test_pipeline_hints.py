@@ -25,9 +25,9 @@ from program_fakes import FLYING_HEIGHT_M, make_settings
 from service.pipeline import Perception
 from service.trouble import Trouble
 from uavdepth.attitude import Attitude
-from uavdepth.hints import Hints
-from uavdepth.obstacle_scan import ObstacleScan, SectorState
-from uavdepth.scanner import ObstacleScanner
+from uavdepth.model.hints import Hints
+from uavdepth.scan.obstacle_scan import ObstacleScan, SectorState
+from uavdepth.scan.scanner import ObstacleScanner
 
 
 def test_metres_come_from_the_network_and_the_height_that_it_is_told() -> None:

@@ -16,9 +16,9 @@ from program_fakes import FLYING_HEIGHT_M, make_settings
 from structlog.testing import capture_logs
 
 from service.pipeline import Perception
-from uavdepth.model_card import CARD_METADATA_KEY
-from uavdepth.obstacle_scan import SectorState
-from uavdepth.providers import PROVIDERS, OpenedSession, ProviderUnavailableError
+from uavdepth.model.card import CARD_METADATA_KEY
+from uavdepth.model.providers import PROVIDERS, OpenedSession, ProviderUnavailableError
+from uavdepth.scan.obstacle_scan import SectorState
 
 
 def write_hinted_network(path: Path) -> Path:

@@ -26,12 +26,12 @@ from service.run import Service
 from service.telemetry import Telemetry
 from service.trouble import Trouble
 from uavdepth.attitude import Attitude
-from uavdepth.body_rays import body_rays
 from uavdepth.camera import CameraModel
-from uavdepth.depth_map import DepthMap
-from uavdepth.hints import Hints
-from uavdepth.obstacle_scan import ObstacleScan, SectorState
-from uavdepth.scale_estimator import ScaleEstimator
+from uavdepth.depth.depth_map import DepthMap
+from uavdepth.model.hints import Hints
+from uavdepth.scale.estimator import ScaleEstimator
+from uavdepth.scan.body_rays import body_rays
+from uavdepth.scan.obstacle_scan import ObstacleScan, SectorState
 
 SETTINGS = make_settings("motion.points=false")
 CAMERA, MOUNT = SETTINGS.camera.model, SETTINGS.mount.mount

@@ -16,16 +16,16 @@ from service.pipeline import Perception, PerceptionResult
 from service.telemetry import Telemetry
 from service.trouble import Trouble
 from uavdepth.attitude import Attitude
-from uavdepth.autopilot_profile import PROFILES
-from uavdepth.body_rays import body_rays
 from uavdepth.camera import CameraModel, CameraMount
-from uavdepth.depth_map import DepthMap
-from uavdepth.hints import Hints
-from uavdepth.obstacle_message import UNKNOWN_WORD, obstacle_words
-from uavdepth.obstacle_scan import SECTOR_COUNT, SECTOR_WIDTH_DEG, SectorState, sector_bearings_deg
-from uavdepth.scale_estimator import ScaleEstimator
-from uavdepth.scan_motion import moved_scan
-from uavdepth.scanner import ObstacleScanner
+from uavdepth.depth.depth_map import DepthMap
+from uavdepth.messages.autopilot_profile import PROFILES
+from uavdepth.messages.obstacle_distance import UNKNOWN_WORD, obstacle_words
+from uavdepth.model.hints import Hints
+from uavdepth.scale.estimator import ScaleEstimator
+from uavdepth.scan.body_rays import body_rays
+from uavdepth.scan.motion import moved_scan
+from uavdepth.scan.obstacle_scan import SECTOR_COUNT, SECTOR_WIDTH_DEG, SectorState, sector_bearings_deg
+from uavdepth.scan.scanner import ObstacleScanner
 
 SETTINGS = make_settings("motion.points=false")
 CAMERA, MOUNT = SETTINGS.camera.model, CameraMount()

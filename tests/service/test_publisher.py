@@ -16,8 +16,8 @@ from service.publisher.session import MAX_MESSAGE_BYTES, Role, open_session
 from service.publisher.topics import PictureTopics
 from service.publisher.wire import CameraHeader, DepthHeader, ScanSample, StatusSample
 from service.trouble import Trouble
-from uavdepth.depth_codec import decode_depth_png
-from uavdepth.depth_map import DepthMap
+from uavdepth.depth.codec import decode_depth_png
+from uavdepth.depth.depth_map import DepthMap
 
 STATUS = StatusSample(
     vehicle="kite",

@@ -27,8 +27,8 @@ from service.recorder.shelf import Shelf
 from service.replay.recorded_images import image_of
 from service.run import Service
 from uavdepth.camera import CameraModel
-from uavdepth.depth_map import DepthMap
-from uavdepth.hints import Hints
+from uavdepth.depth.depth_map import DepthMap
+from uavdepth.model.hints import Hints
 
 HERE = Path(__file__).parent
 

@@ -31,8 +31,8 @@ from service.replay.recording import Recording
 from service.replay.replayed_link import ReplayedLink
 from service.settings import ExtraCameraSettings, Settings
 from service.settings.autopilot import AutopilotSettings
-from uavdepth.depth_map import DepthMap
-from uavdepth.obstacle_scan import SectorState
+from uavdepth.depth.depth_map import DepthMap
+from uavdepth.scan.obstacle_scan import SectorState
 
 MS_NS = 1_000_000
 WALL_M = 6.0

@@ -20,7 +20,7 @@ from service.fake_autopilot.fake_autopilot import FakeAutopilot
 from service.fake_autopilot.pilot import Pilot
 from service.run import Service
 from service.trouble import Trouble
-from uavdepth.obstacle_scan import SectorState
+from uavdepth.scan.obstacle_scan import SectorState
 
 AHEAD = 31
 

@@ -11,7 +11,7 @@ import pytest
 from command_line import LIMIT_S, started, uavdepth
 from program_files import CARD, write_config, write_network, write_pictures
 
-from uavdepth.model_card import CARD_METADATA_KEY
+from uavdepth.model.card import CARD_METADATA_KEY
 
 
 def test_run_without_anything_says_what_it_needs() -> None:

@@ -30,7 +30,7 @@ from service.run import Service
 from service.settings import Settings
 from service.trouble import Trouble
 from uavdepth.camera import CameraModel
-from uavdepth.depth_map import DepthMap
+from uavdepth.depth.depth_map import DepthMap
 
 
 def test_losing_the_height_in_the_air_is_critical_and_its_return_is_told() -> None:

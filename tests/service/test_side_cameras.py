@@ -37,8 +37,8 @@ from service.side_cameras import SideCameras
 from service.telemetry import Telemetry
 from service.trouble import Trouble
 from uavdepth.attitude import Attitude
-from uavdepth.obstacle_scan import SectorState
-from uavdepth.scale_estimator import ScaleEstimator
+from uavdepth.scale.estimator import ScaleEstimator
+from uavdepth.scan.obstacle_scan import SectorState
 
 AHEAD, RIGHT = 31, 31 + 18
 """Elements along the nose and at 90 degrees."""

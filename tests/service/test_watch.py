@@ -16,7 +16,7 @@ from service.publisher.wire import MAX_SAMPLE_BYTES, ScanSample, StatusSample
 from service.watch.board import Board
 from service.watch.listener import Listener
 from service.watch.view import board_json, render_board
-from uavdepth.obstacle_scan import ObstacleScan, SectorState, sector_bearings_deg
+from uavdepth.scan.obstacle_scan import ObstacleScan, SectorState, sector_bearings_deg
 
 SECOND = 1_000_000_000
 

@@ -21,7 +21,7 @@ from service.publisher.wire import (
     WireError,
 )
 from uavdepth.camera import CameraModel
-from uavdepth.obstacle_scan import SECTOR_COUNT, ObstacleScan, SectorState, sector_bearings_deg
+from uavdepth.scan.obstacle_scan import SECTOR_COUNT, ObstacleScan, SectorState, sector_bearings_deg
 
 CAMERA = CameraModel(64, 48, 50.0, 51.0, 31.5, 23.5, (0.1, 0.0, 0.0, 0.0))
 

@@ -9,9 +9,9 @@ from frames import HEIGHT, WIDTH
 from numpy.typing import NDArray
 
 from uavdepth.camera import CameraModel
-from uavdepth.depth_map import DepthMap
-from uavdepth.hints import Hints
-from uavdepth.model_card import HintName, ModelCard
+from uavdepth.depth.depth_map import DepthMap
+from uavdepth.model.card import HintName, ModelCard
+from uavdepth.model.hints import Hints
 
 
 class KnowingNetwork:

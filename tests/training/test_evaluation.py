@@ -23,8 +23,8 @@ from training.evaluation_sources import (
     points_scaled,
 )
 from training.evaluation_summary import summarise
-from uavdepth.depth_model import DepthModel
 from uavdepth.errors import ImageSizeError
+from uavdepth.model.depth_model import DepthModel
 
 
 def measured(network: KnowingNetwork | None = None, **changes: object) -> MeasuredFrame:

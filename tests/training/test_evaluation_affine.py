@@ -12,7 +12,7 @@ from training.evaluation_affine import fit_to_points, fit_to_truth
 from training.evaluation_sky import FAR_M, sky_errors
 from training.evaluation_sources import Answer
 from uavdepth.camera import CameraModel
-from uavdepth.hints import PointHints
+from uavdepth.model.hints import PointHints
 
 CAMERA = CameraModel.from_fov(60, 40, 80.0)
 

@@ -30,7 +30,7 @@ from training.evaluation_run import evaluate_kitti
 from training.evaluation_sources import CONSTANT, FLAT_GROUND, Sources, nearest_of, points_scaled
 from training.sequences.garg_crop import garg_mask
 from training.sequences.kitti_raw import open_kitti_raw
-from uavdepth.depth_model import DepthModel
+from uavdepth.model.depth_model import DepthModel
 
 REAL = Path(__file__).parents[3] / "shared" / "data" / "kitti_raw"
 needs_real_pictures = pytest.mark.skipif(

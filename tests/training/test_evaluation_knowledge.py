@@ -20,8 +20,8 @@ from training.evaluation_knowledge import (
     points_ratio,
     vehicle_knowledge,
 )
-from uavdepth.hint_planes import MOST_POINTS
-from uavdepth.hints import Hints, PointHints
+from uavdepth.model.hint_planes import MOST_POINTS
+from uavdepth.model.hints import Hints, PointHints
 
 
 def textured(index: int = 0, height_m: float | None = 3.0) -> EvaluationFrame:

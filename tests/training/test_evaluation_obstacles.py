@@ -21,8 +21,8 @@ from training.evaluation_obstacles import (
 )
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
-from uavdepth.obstacle_scan import SECTOR_COUNT, ObstacleScan, SectorState, sector_bearings_deg
-from uavdepth.scanner import ObstacleScanner
+from uavdepth.scan.obstacle_scan import SECTOR_COUNT, ObstacleScan, SectorState, sector_bearings_deg
+from uavdepth.scan.scanner import ObstacleScanner
 
 CAMERA = CameraModel.from_fov(320, 192, 80.0)
 LEVEL = Attitude(0.0, 0.0, 0.0)

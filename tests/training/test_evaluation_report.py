@@ -24,7 +24,7 @@ from training.evaluation_sources import (
 )
 from training.evaluation_summary import summarise
 from training.evaluation_tables import tables
-from uavdepth.depth_model import DepthModel
+from uavdepth.model.depth_model import DepthModel
 
 
 def test_kinds_of_scene_that_were_never_trained_on_are_reported_apart(

@@ -28,8 +28,8 @@ from training.settings import SizePhase, TrainingSettings
 from training.trainer import Trainer
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
-from uavdepth.depth_model import DepthModel
-from uavdepth.hints import GroundHint, Hints, PointHints
+from uavdepth.model.depth_model import DepthModel
+from uavdepth.model.hints import GroundHint, Hints, PointHints
 
 SIZE = (128, 64)
 """Another than that of the run: every size comes from one checkpoint."""

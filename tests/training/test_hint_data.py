@@ -25,8 +25,8 @@ from training.errors import TrainingSettingsError
 from training.normalization import FOCAL_REFERENCE_PX
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
-from uavdepth.hint_planes import ground_plane
-from uavdepth.hints import GroundHint, Hints, PointHints
+from uavdepth.model.hint_planes import ground_plane
+from uavdepth.model.hints import GroundHint, Hints, PointHints
 from uavdepth.scenes import load_scene
 
 CAMERA = CameraModel(160, 96, 95.0, 80.0, 78.0, 50.0)

@@ -19,7 +19,7 @@ from training.baselines import (
 from training.metrics import DEPTH_CAP_M, MIN_PIXELS, DepthMetrics, depth_metrics, median_factor
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
-from uavdepth.hints import PointHints
+from uavdepth.model.hints import PointHints
 
 
 def filled(*values: float) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:

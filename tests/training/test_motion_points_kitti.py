@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from training.sequences.kitti_raw import KittiDrive, open_kitti_raw
 from training.sequences.oxts import Oxts
 from uavdepth import Attitude, CameraMount, PointHints
-from uavdepth.motion_points import MotionPoints
-from uavdepth.vehicle_motion import VehicleMotion
+from uavdepth.motion.motion_points import MotionPoints
+from uavdepth.motion.vehicle_motion import VehicleMotion
 
 KITTI = Path(__file__).parents[2].parent / "shared" / "data" / "kitti_raw"
 

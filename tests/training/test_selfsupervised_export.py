@@ -17,7 +17,7 @@ from training.selfsupervised.run_state import RunState
 from training.selfsupervised.settings import parse_settings
 from training.selfsupervised.trained_network import trained_network
 from uavdepth.camera import CameraModel
-from uavdepth.depth_model import DepthModel
+from uavdepth.model.depth_model import DepthModel
 
 SIZE = (96, 64)
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uavdepth import Attitude, CameraModel, CameraMount
-from uavdepth.vehicle_motion import MotionNoise, VehicleMotion
+from uavdepth.motion.vehicle_motion import MotionNoise, VehicleMotion
 
 Place = Callable[[float], tuple[tuple[float, float, float], tuple[float, float, float]]]
 """Position and velocity (NED) at a time in seconds."""

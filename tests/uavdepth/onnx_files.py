@@ -10,7 +10,7 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
-from uavdepth.model_card import CARD_METADATA_KEY
+from uavdepth.model.card import CARD_METADATA_KEY
 
 WIDTH, HEIGHT = 48, 32
 MEAN, STD = [0.485, 0.456, 0.406], [0.229, 0.224, 0.225]

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from uavdepth import ObstacleScan, SectorState
-from uavdepth.obstacle_scan import sector_bearings_deg
+from uavdepth.scan.obstacle_scan import sector_bearings_deg
 
 
 def scan_of(distance_m, state, nearest: float = 0.2, farthest: float = 20.0) -> ObstacleScan:

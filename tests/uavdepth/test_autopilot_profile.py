@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from uavdepth import ObstacleScan, ScanError, SectorState, encode_obstacle_distance, obstacle_words
-from uavdepth.autopilot_profile import ARDUPILOT, PROFILES, PX4, PX4_LEGACY, AutopilotProfile
-from uavdepth.obstacle_scan import sector_bearings_deg
+from uavdepth.messages.autopilot_profile import ARDUPILOT, PROFILES, PX4, PX4_LEGACY, AutopilotProfile
+from uavdepth.scan.obstacle_scan import sector_bearings_deg
 
 CLEAR_WORD, UNKNOWN_WORD = 2001, 65535
 BEARINGS = sector_bearings_deg()

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uavdepth import Attitude, CameraModel, CameraModelError, CameraMount
-from uavdepth.body_rays import body_rays
+from uavdepth.scan.body_rays import body_rays
 
 angles = st.floats(-math.pi, math.pi)
 

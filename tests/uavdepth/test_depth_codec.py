@@ -21,8 +21,8 @@ from uavdepth import (
     decode_depth_png,
     encode_depth_png,
 )
-from uavdepth.depth_codec import depth_codes
-from uavdepth.depth_colors import UNKNOWN_BGR
+from uavdepth.depth.codec import depth_codes
+from uavdepth.depth.colors import UNKNOWN_BGR
 
 spans = st.tuples(st.floats(0.01, 50), st.floats(2, 10000)).map(lambda pair: (pair[0], pair[0] * pair[1]))
 depths = st.one_of(

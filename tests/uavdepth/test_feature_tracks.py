@@ -7,7 +7,7 @@ from moving_camera import wall_picture
 from numpy.typing import NDArray
 
 from uavdepth import CameraModel
-from uavdepth.feature_tracks import MOST_FRAMES, MOST_TRACKS, FeatureTracks
+from uavdepth.motion.feature_tracks import MOST_FRAMES, MOST_TRACKS, FeatureTracks
 
 CAMERA = CameraModel.from_fov(320, 160, 90)
 

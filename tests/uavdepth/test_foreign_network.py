@@ -13,7 +13,7 @@ from onnx import TensorProto
 from onnx_files import HEIGHT, WIDTH, card_values, write_formatted_network, write_red_network, write_toml_card
 
 from uavdepth import CameraModel, DepthMap, DepthModel, ModelCard, ModelCardError, ModelFileError
-from uavdepth.model_card import OutputKind
+from uavdepth.model.card import OutputKind
 
 CAMERA = CameraModel.from_fov(96, 64, 90)
 DEPTH_ANYTHING = Path(__file__).parents[1] / "data" / "depth_anything_tiny.onnx"

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uavdepth import Attitude, CameraModel, CameraMount, GroundHint, HintError, PointHints
-from uavdepth.hint_planes import FARTHEST_GROUND_M, MOST_POINTS, ground_plane, point_planes
+from uavdepth.model.hint_planes import FARTHEST_GROUND_M, MOST_POINTS, ground_plane, point_planes
 
 WIDTH, HEIGHT, FOCAL_PX = 96, 48, 77.0
 LEVEL = Attitude(0.0, 0.0, 0.0)

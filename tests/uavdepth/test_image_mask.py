@@ -10,7 +10,7 @@ from solids import depth_of, pole, wall
 
 from uavdepth import ImageSizeError, ObstacleScanner, SectorState
 from uavdepth.errors import ImageMaskError
-from uavdepth.image_mask import load_image_mask
+from uavdepth.scan.image_mask import load_image_mask
 
 CLEAR, UNKNOWN = SectorState.CLEAR, SectorState.UNKNOWN
 

@@ -11,8 +11,8 @@ from moving_camera import LEVEL, Place, straight, told, wall_picture
 from numpy.typing import NDArray
 
 from uavdepth import CameraModel, CameraMount, ImageSizeError, PointHints
-from uavdepth.motion_points import MotionPoints, MotionPointSettings
-from uavdepth.vehicle_motion import VehicleMotion
+from uavdepth.motion.motion_points import MotionPoints, MotionPointSettings
+from uavdepth.motion.vehicle_motion import VehicleMotion
 
 CAMERA = CameraModel.from_fov(320, 160, 90)
 WALL_M = 10.0

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from uavdepth import Attitude, CameraModel, CameraMount, DepthMap, PointHints
-from uavdepth.motion_points import MotionPoints
-from uavdepth.scale_estimator import ScaleEstimate, ScaleEstimator
-from uavdepth.vehicle_motion import VehicleMotion
+from uavdepth.motion.motion_points import MotionPoints
+from uavdepth.motion.vehicle_motion import VehicleMotion
+from uavdepth.scale.estimator import ScaleEstimate, ScaleEstimator
 
 pytest.importorskip("embreex", reason="rendered worlds need the extra sim")
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from uavdepth import Attitude, CameraModel, CameraMount, ImageSizeError
-from uavdepth.ground_plane import GroundPlane, find_ground_plane
 from uavdepth.mount_check import MountState, MountVerdict, check_mount
+from uavdepth.scale.ground_plane import GroundPlane, find_ground_plane
 
 CAMERA = CameraModel.from_fov(160, 120, 80)
 CONFIGURED = CameraMount(pitch_deg=-15.0)

@@ -12,7 +12,7 @@ from hypothesis.extra import numpy as hnp
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from uavdepth import ObstacleScan, ScanError, SectorState, encode_obstacle_distance, obstacle_words
-from uavdepth.obstacle_scan import sector_bearings_deg
+from uavdepth.scan.obstacle_scan import sector_bearings_deg
 
 UNKNOWN_WORD = 65535
 

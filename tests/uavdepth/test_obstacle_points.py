@@ -12,8 +12,8 @@ from hypothesis.extra import numpy as hnp
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from uavdepth import Attitude, ObstacleScan, ScanError, SectorState, obstacle_words
-from uavdepth.obstacle_points import encode_obstacle_points, obstacle_points
-from uavdepth.obstacle_scan import sector_bearings_deg
+from uavdepth.messages.obstacle_points import encode_obstacle_points, obstacle_points
+from uavdepth.scan.obstacle_scan import sector_bearings_deg
 
 BEARINGS = sector_bearings_deg()
 LEVEL = Attitude(0.0, 0.0, 0.0)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from uavdepth.hint_planes import HALF_CONFIDENCE_SIGMA
-from uavdepth.point_fit import fit_to_points
+from uavdepth.model.hint_planes import HALF_CONFIDENCE_SIGMA
+from uavdepth.model.point_fit import fit_to_points
 
 HEIGHT, WIDTH = 96, 192
 TRUE_LOG_Q = np.broadcast_to(np.linspace(-3.5, -1.0, HEIGHT, dtype=np.float32)[:, None], (HEIGHT, WIDTH))

@@ -11,10 +11,11 @@ from typing import Any
 import pytest
 from onnx_files import card_values, write_red_network
 
-from uavdepth import ModelFileError, providers
+from uavdepth import ModelFileError
 from uavdepth.errors import ProviderFallbackWarning
-from uavdepth.inference import open_session
-from uavdepth.providers import PROVIDERS, ProviderUnavailableError, computes_bfloat16
+from uavdepth.model import providers
+from uavdepth.model.inference import open_session
+from uavdepth.model.providers import PROVIDERS, ProviderUnavailableError, computes_bfloat16
 
 open_cpu = PROVIDERS["cpu"].open
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from solids import box, depth_of, ground, slope, wall
 
 from uavdepth import Attitude, CameraModel, CameraMount, DepthMap, GroundHint, ImageSizeError, PointHints
-from uavdepth.scale_estimator import ScaleEstimate, ScaleEstimator, apply
+from uavdepth.scale.estimator import ScaleEstimate, ScaleEstimator, apply
 
 CAMERA = CameraModel.from_fov(320, 160, 90)
 MOUNT = CameraMount(pitch_deg=-10)

@@ -13,8 +13,8 @@ from scan_strategies import scan_of, scans, single
 from solids import box, depth_of, ground, turned
 
 from uavdepth import ObstacleScanner, ScanError, SectorState
-from uavdepth.scan_memory import ScanMemory
-from uavdepth.scan_motion import PlanarPose, moved_scan
+from uavdepth.scan.memory import ScanMemory
+from uavdepth.scan.motion import PlanarPose, moved_scan
 
 OBSTACLE, CLEAR, UNKNOWN = SectorState.OBSTACLE, SectorState.CLEAR, SectorState.UNKNOWN
 FRAME_NS = 66_666_667

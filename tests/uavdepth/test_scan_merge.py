@@ -13,7 +13,7 @@ from scan_strategies import scan_of, scans, single
 from solids import box, depth_of, ground, pole
 
 from uavdepth import CameraMount, ObstacleScanner, ScanError, SectorState, obstacle_words
-from uavdepth.scan_merge import merge_scans
+from uavdepth.scan.merge import merge_scans
 
 OBSTACLE, CLEAR, UNKNOWN = SectorState.OBSTACLE, SectorState.CLEAR, SectorState.UNKNOWN
 

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from uavdepth import ObstacleScan, ScanError, SectorState, obstacle_words
-from uavdepth.obstacle_scan import sector_bearings_deg
-from uavdepth.scan_motion import PlanarPose, moved_scan
+from uavdepth.scan.motion import PlanarPose, moved_scan
+from uavdepth.scan.obstacle_scan import sector_bearings_deg
 
 FIELD = [element(bearing) for bearing in range(-45, 50, 5)]
 

@@ -10,7 +10,7 @@ from elements import attitude_deg, element, obstacles
 from solids import box, depth_of, ground, slope, smooth_noise, turned, wall
 
 from uavdepth import CameraMount, ObstacleScanner, ScanError, SectorState
-from uavdepth.sloping_ground import FLIGHT_CLEARANCE_M
+from uavdepth.scan.sloping_ground import FLIGHT_CLEARANCE_M
 
 
 def too_near_m(height: float, rise_deg: float) -> float:

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from uavdepth import CameraMount
+from uavdepth.motion.triangulation import Triangulation, triangulate
+from uavdepth.motion.vehicle_motion import CameraMotion, MotionNoise
 from uavdepth.rotation import rotation_zyx
-from uavdepth.triangulation import Triangulation, triangulate
-from uavdepth.vehicle_motion import CameraMotion, MotionNoise
 
 PIXEL = 0.3 / 320
 SURE = MotionNoise(attitude_rad=1e-5, velocity_mps=1e-4, position_m=1e-4)

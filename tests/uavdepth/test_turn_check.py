@@ -10,8 +10,8 @@ import pytest
 from moving_camera import straight, told, wall_picture
 
 from uavdepth import CameraModel, CameraMount
-from uavdepth.motion_points import MotionPoints
-from uavdepth.turn_check import TurnCheck
+from uavdepth.motion.motion_points import MotionPoints
+from uavdepth.motion.turn_check import TurnCheck
 
 
 def turn(degrees: float) -> np.ndarray:

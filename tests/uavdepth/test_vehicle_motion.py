@@ -9,7 +9,7 @@ import pytest
 from moving_camera import LEVEL, straight, told
 
 from uavdepth import Attitude, CameraMount
-from uavdepth.vehicle_motion import MotionNoise, VehicleMotion
+from uavdepth.motion.vehicle_motion import MotionNoise, VehicleMotion
 
 S = 1_000_000_000
 

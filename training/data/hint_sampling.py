@@ -13,8 +13,8 @@ from training.data.views import View
 from training.errors import TrainingSettingsError
 from training.normalization import FOCAL_REFERENCE_PX
 from uavdepth.attitude import Attitude
-from uavdepth.hint_planes import ground_plane, point_planes
-from uavdepth.hints import GroundHint, Hints
+from uavdepth.model.hint_planes import ground_plane, point_planes
+from uavdepth.model.hints import GroundHint, Hints
 
 POINT_COUNTS = (5, 300)
 """Fewest and most points of a picture, drawn log-uniformly."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uavdepth.camera import CameraModel
-from uavdepth.hints import PointHints
+from uavdepth.model.hints import PointHints
 
 FARTHEST_POINT_M = 80.0
 """Beyond it a few decimetres of baseline give no parallax."""

@@ -92,7 +92,7 @@ class DepthNetwork(nn.Module):
 
         Args:
             image: (N, 3, H, W) normalised RGB; H and W divisible by 32.
-            ground: (N, 1, H, W) q of the flat ground (`uavdepth.hint_planes`), 0 where there is none.
+            ground: (N, 1, H, W) q of the flat ground (`uavdepth.model.hint_planes`), 0 where there is none.
             points: (N, 2, H, W) q of measured points and the confidence in them, 0 where there is none.
         """
         size = (image.shape[0], 1, *image.shape[2:])

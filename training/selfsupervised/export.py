@@ -15,8 +15,8 @@ from training.networks.disparity import SIZE_STEP, SMALLEST_SIDE, DisparityNetwo
 from training.onnx_file import trace, write_checked
 from training.selfsupervised.run_state import RunState
 from training.selfsupervised.trained_network import trained_network
-from uavdepth.depth_model import DepthModel
-from uavdepth.model_card import ModelCard
+from uavdepth.model.card import ModelCard
+from uavdepth.model.depth_model import DepthModel
 
 LARGEST_DIFFERENCE = 1e-3
 """Of inverse depth between PyTorch and ONNX Runtime, relative."""

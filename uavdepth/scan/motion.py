@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uavdepth.errors import ScanError
-from uavdepth.obstacle_scan import (
+from uavdepth.scan.obstacle_scan import (
     FIRST_BEARING_DEG,
     SECTOR_COUNT,
     SECTOR_WIDTH_DEG,

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uavdepth.level_ground import GROUND_FLOOR_M, LevelGround
-from uavdepth.obstacle_scan import FIRST_BEARING_DEG, SECTOR_COUNT, SECTOR_WIDTH_DEG
+from uavdepth.scan.level_ground import GROUND_FLOOR_M, LevelGround
+from uavdepth.scan.obstacle_scan import FIRST_BEARING_DEG, SECTOR_COUNT, SECTOR_WIDTH_DEG
 
 FLIGHT_CLEARANCE_M = 0.5
 """Ground that comes nearer than this to the flight level from below is in the way like anything else: a

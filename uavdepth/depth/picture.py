@@ -10,7 +10,7 @@ DEPTH_PICTURE_VERSION = 1
 """Goes up when the meaning of a code or of a field changes."""
 
 LOG_DEPTH_ENCODING = "log8-png"
-"""`uavdepth.depth_codec`: 0 invalid, 1 nearer than near_m, 2 to 254 logarithmic, 255 far_m or beyond."""
+"""`uavdepth.depth.codec`: 0 invalid, 1 nearer than near_m, 2 to 254 logarithmic, 255 far_m or beyond."""
 
 
 @dataclass(frozen=True)

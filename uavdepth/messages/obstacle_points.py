@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from uavdepth.attitude import Attitude
 from uavdepth.errors import ScanError
-from uavdepth.obstacle_message import (
+from uavdepth.messages.obstacle_distance import (
     MAV_DISTANCE_SENSOR_UNKNOWN,
     MAV_FRAME_BODY_FRD,
     limits_cm,
     obstacle_words,
 )
-from uavdepth.obstacle_scan import ObstacleScan
+from uavdepth.scan.obstacle_scan import ObstacleScan
 
 if TYPE_CHECKING:
     from pymavlink.dialects.v20.ardupilotmega import MAVLink_obstacle_distance_3d_message
@@ -39,7 +39,7 @@ def obstacle_points(scan: ObstacleScan, attitude: Attitude, most: int) -> NDArra
         (N, 3) metres, as far as the words of OBSTACLE_DISTANCE tell; nearer than min is told as min + 1 cm.
 
     Raises:
-        ScanError: see `uavdepth.obstacle_message.obstacle_words`; an attitude that is not finite.
+        ScanError: see `uavdepth.messages.obstacle_distance.obstacle_words`; an attitude that is not finite.
     """
     if not np.isfinite([attitude.roll_rad, attitude.pitch_rad]).all():
         raise ScanError(f"roll {attitude.roll_rad} and pitch {attitude.pitch_rad} must be finite")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from uavdepth.camera import CameraModel
 from uavdepth.errors import HintError
-from uavdepth.hints import GroundHint, PointHints
+from uavdepth.model.hints import GroundHint, PointHints
 
 FARTHEST_GROUND_M = 200.0
 """From 3.5 m up, ground so far away lies 1 degree below the horizon: as much as an attitude is wrong."""

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uavdepth.camera import CameraModel
-from uavdepth.depth_map import DepthMap
+from uavdepth.depth.depth_map import DepthMap
 from uavdepth.errors import ImageSizeError, ModelCardError, ModelFileError
-from uavdepth.hint_planes import ground_plane, point_planes
-from uavdepth.hints import Hints
-from uavdepth.inference import InferenceSession, open_session
-from uavdepth.model_card import ModelCard
-from uavdepth.network_file import WEIGHTS_FOLDER, find_network, network_problems, read_card
-from uavdepth.point_fit import fit_to_points
+from uavdepth.model.card import ModelCard
+from uavdepth.model.hint_planes import ground_plane, point_planes
+from uavdepth.model.hints import Hints
+from uavdepth.model.inference import InferenceSession, open_session
+from uavdepth.model.network_file import WEIGHTS_FOLDER, find_network, network_problems, read_card
+from uavdepth.model.point_fit import fit_to_points
 
 __all__ = ["WEIGHTS_FOLDER", "DepthModel"]
 
@@ -100,7 +100,7 @@ class DepthModel:
             camera: the camera, in the pixels of the picture.
             hints: what the vehicle knows. Those that the network does not take are left out, and it
                 works without those that are not given. The answer of one that takes points is drawn to
-                them (`uavdepth.point_fit`).
+                them (`uavdepth.model.point_fit`).
 
         Raises:
             ImageSizeError: the picture's size is not the camera's, or it is not an 8-bit BGR picture.

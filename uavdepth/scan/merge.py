@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from uavdepth.errors import ScanError
-from uavdepth.obstacle_scan import SECTOR_COUNT, ObstacleScan, SectorState
+from uavdepth.scan.obstacle_scan import SECTOR_COUNT, ObstacleScan, SectorState
 
 
 def merge_scans(scans: Sequence[ObstacleScan]) -> ObstacleScan:
@@ -20,7 +20,7 @@ def merge_scans(scans: Sequence[ObstacleScan]) -> ObstacleScan:
       camera that sees a part of an element says UNKNOWN, and two halves never add up to CLEAR here;
     - UNKNOWN else. An obstacle without a usable distance is doubt, which no other camera's CLEAR lifts.
 
-    Scans of different moments have to be brought to one first (`uavdepth.scan_motion.moved_scan`).
+    Scans of different moments have to be brought to one first (`uavdepth.scan.motion.moved_scan`).
 
     Args:
         scans: at least one, all with the same limits.

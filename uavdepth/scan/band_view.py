@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uavdepth.camera import CameraModel, CameraMount
-from uavdepth.obstacle_scan import SECTOR_COUNT, SECTOR_WIDTH_DEG, sector_bearings_deg
+from uavdepth.scan.obstacle_scan import SECTOR_COUNT, SECTOR_WIDTH_DEG, sector_bearings_deg
 
 SLICES = 6
 """Directions probed in each element, its two edges among them: 1 degree apart."""

@@ -9,19 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uavdepth.attitude import Attitude
-from uavdepth.band_view import BandView, seen_sectors
-from uavdepth.body_rays import body_rays
 from uavdepth.camera import CameraModel, CameraMount
 from uavdepth.errors import ImageSizeError, ScanError
-from uavdepth.joined_rows import mean_of_rows, nearest_of_rows, rows_together
-from uavdepth.level_ground import GROUND_DEPTH_SHARE, LevelGround, find_level_ground
-from uavdepth.level_points import level_points, near_heights
-from uavdepth.obstacle_scan import ObstacleScan, SectorState, sector_bearings_deg
-from uavdepth.range_histogram import RangeHistogram
-from uavdepth.required_pixels import pixels_of_line, pixels_of_thing, smallest_thing
-from uavdepth.scan_caution import ScanCaution
-from uavdepth.sloping_ground import GroundProfile, SlopingGround
-from uavdepth.speckles import SpeckleFilter
+from uavdepth.scan.band_view import BandView, seen_sectors
+from uavdepth.scan.body_rays import body_rays
+from uavdepth.scan.caution import ScanCaution
+from uavdepth.scan.joined_rows import mean_of_rows, nearest_of_rows, rows_together
+from uavdepth.scan.level_ground import GROUND_DEPTH_SHARE, LevelGround, find_level_ground
+from uavdepth.scan.level_points import level_points, near_heights
+from uavdepth.scan.obstacle_scan import ObstacleScan, SectorState, sector_bearings_deg
+from uavdepth.scan.range_histogram import RangeHistogram
+from uavdepth.scan.required_pixels import pixels_of_line, pixels_of_thing, smallest_thing
+from uavdepth.scan.sloping_ground import GroundProfile, SlopingGround
+from uavdepth.scan.speckles import SpeckleFilter
 
 FREE_SHARE = 0.7
 """Share of the band's height that must be seen free before an element is clear. The flight level

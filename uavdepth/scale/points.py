@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uavdepth.camera import CameraModel
-from uavdepth.hints import PointHints
+from uavdepth.model.hints import PointHints
 
 Array = NDArray[np.float64]
 

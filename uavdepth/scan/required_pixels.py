@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uavdepth.camera import CameraModel, CameraMount
-from uavdepth.obstacle_scan import SECTOR_WIDTH_DEG, sector_bearings_deg
+from uavdepth.scan.obstacle_scan import SECTOR_WIDTH_DEG, sector_bearings_deg
 
 SMALLEST_SIZE_M = 0.25
 """Side of the square that must be found at maximum distance; sets the default of min_pixels."""

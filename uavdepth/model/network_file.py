@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from uavdepth.errors import ModelCardError, ModelFileError
-from uavdepth.model_card import CARD_FILE_SUFFIX, CARD_METADATA_KEY, ModelCard
+from uavdepth.model.card import CARD_FILE_SUFFIX, CARD_METADATA_KEY, ModelCard
 
-WEIGHTS_FOLDER = Path(__file__).parent / "weights"
+WEIGHTS_FOLDER = Path(__file__).parent.parent / "weights"
 """Networks that ship with the package: `<name>.onnx`."""
 
 _INPUT_TYPES = ("tensor(float)", "tensor(float16)")

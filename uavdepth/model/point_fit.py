@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uavdepth.hint_planes import HALF_CONFIDENCE_SIGMA
+from uavdepth.model.hint_planes import HALF_CONFIDENCE_SIGMA
 
 _COLUMNS = 48
 """Cells of the corrections' grid across the picture: corrections are equal inside a cell."""
@@ -67,7 +67,7 @@ def fit_to_points(log_q: NDArray[np.float32], planes: NDArray[np.float32]) -> ND
     Args:
         log_q: (h, w) float32 predicted log inverse depth, in any unit; what is not finite stays as it is.
         planes: (2, h, w) float32 measured q at the points' pixels, in the unit of the prediction, and the
-            confidence in it, 0 elsewhere; as `uavdepth.hint_planes.point_planes` makes them.
+            confidence in it, 0 elsewhere; as `uavdepth.model.hint_planes.point_planes` makes them.
 
     Returns:
         (h, w) float32; the prediction itself without points.
@@ -86,7 +86,8 @@ def fit_to_points(log_q: NDArray[np.float32], planes: NDArray[np.float32]) -> ND
         smoothed = grid.smoothed(row, column, here, residual, weight, reach)
         residual = residual - smoothed.reshape(-1)[at_points]
         corrections += smoothed
-    everywhere = grid.cells_of(*np.ogrid[: log_q.shape[0], : log_q.shape[1]], log_q)
+    rows, columns = np.ogrid[: log_q.shape[0], : log_q.shape[1]]
+    everywhere = grid.cells_of(rows, columns, log_q)
     return log_q + np.take(corrections, everywhere)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uavdepth.errors import ScanError
-from uavdepth.obstacle_scan import FIRST_BEARING_DEG, SECTOR_COUNT, SECTOR_WIDTH_DEG, sector_bearings_deg
+from uavdepth.scan.obstacle_scan import FIRST_BEARING_DEG, SECTOR_COUNT, SECTOR_WIDTH_DEG, sector_bearings_deg
 
 LEAST_INCREMENT_DEG = 5.0
 """Below it PX4 reads past the 72 words and sees memory contents as obstacles (measured, 1.15.4 and 1.18)."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from uavdepth.errors import ModelFileError, ProviderFallbackWarning
-from uavdepth.providers import PROVIDERS, ProviderUnavailableError, runtime_errors
+from uavdepth.model.providers import PROVIDERS, ProviderUnavailableError, runtime_errors
 
 Provider = Literal["auto", "tensorrt", "cuda", "openvino", "cpu"]
 """auto: the first of the others that is installed and takes the network."""

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uavdepth.errors import ScanError
-from uavdepth.obstacle_scan import ObstacleScan, SectorState
-from uavdepth.scan_motion import PlanarPose, moved_scans
+from uavdepth.scan.motion import PlanarPose, moved_scans
+from uavdepth.scan.obstacle_scan import ObstacleScan, SectorState
 
 LONGEST_MEMORY_S = 0.5
 """PX4 forgets a bin after as long; what is older is not evidence in a world that moves."""

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from uavdepth.depth_codec import INVALID_CODE, NEARER_CODE, depth_codes
+from uavdepth.depth.codec import INVALID_CODE, NEARER_CODE, depth_codes
 
 UNKNOWN_BGR = (112, 112, 112)
 """Grey: the colour map has no grey, so unknown is never mistaken for a distance."""

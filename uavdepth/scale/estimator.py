@@ -13,16 +13,16 @@ from typing import Literal
 
 import numpy as np
 
-from uavdepth.body_rays import body_rays
 from uavdepth.camera import CameraModel, CameraMount
-from uavdepth.depth_map import DepthMap
+from uavdepth.depth.depth_map import DepthMap
 from uavdepth.errors import ImageSizeError
-from uavdepth.ground_scale import MAX_PLANE_DEPTH_M, MIN_DEPRESSION, MIN_HEIGHT_M, GroundScaler
-from uavdepth.hints import GroundHint, PointHints
-from uavdepth.scale_filter import GROUND, POINTS, ScaleFilter, ScaleReading
-from uavdepth.scale_points import LEAST_POINTS, PointScale, sample, scale_from_points
-from uavdepth.scale_shape import AffineSamples, AffineShape, fit_affine
-from uavdepth.scale_suspicion import Disagreement
+from uavdepth.model.hints import GroundHint, PointHints
+from uavdepth.scale.filter import GROUND, POINTS, ScaleFilter, ScaleReading
+from uavdepth.scale.ground_scale import MAX_PLANE_DEPTH_M, MIN_DEPRESSION, MIN_HEIGHT_M, GroundScaler
+from uavdepth.scale.points import LEAST_POINTS, PointScale, sample, scale_from_points
+from uavdepth.scale.shape import AffineSamples, AffineShape, fit_affine
+from uavdepth.scale.suspicion import Disagreement
+from uavdepth.scan.body_rays import body_rays
 
 NetworkKind = Literal["relative", "affine", "metric"]
 

@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from uavdepth.vehicle_motion import CameraMotion, MotionNoise
+from uavdepth.motion.vehicle_motion import CameraMotion, MotionNoise
 
 Array = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uavdepth.camera import CameraModel, CameraMount
-from uavdepth.hints import PointHints
-from uavdepth.vehicle_motion import VehicleMotion
+from uavdepth.model.hints import PointHints
+from uavdepth.motion.vehicle_motion import VehicleMotion
 
 MOST_POINTS = 300
 

@@ -88,7 +88,7 @@ class ModelCard(BaseModel):
     The second output, where `uncertainty` is true, is log of sigma / depth, in the same layout.
 
     Further inputs, where `hints` names them, are float32 planes of the picture's size, made by
-    `uavdepth.hint_planes`; all of a plane is 0 where nothing is known:
+    `uavdepth.model.hint_planes`; all of a plane is 0 where nothing is known:
 
         ground:  (1, 1, H, W)  inverse depth of level ground
         points:  (1, 2, H, W)  inverse depth of measured points, and the confidence in it

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uavdepth.attitude import Attitude
-from uavdepth.body_rays import body_rays
 from uavdepth.camera import CameraModel, CameraMount
 from uavdepth.errors import ImageSizeError
+from uavdepth.scan.body_rays import body_rays
 
 MIN_HEIGHT_M = 0.3
 """Lower, the rangefinder's error and the landing gear are as large as the height."""

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uavdepth.camera import CameraModel, CameraMount
-from uavdepth.carried_points import CarriedPoints
 from uavdepth.errors import ImageSizeError
-from uavdepth.feature_tracks import MOST_FRAMES, FeatureTracks
-from uavdepth.hints import PointHints
-from uavdepth.triangulation import triangulate
-from uavdepth.turn_check import TurnCheck
-from uavdepth.vehicle_motion import CameraMotion, VehicleMotion
+from uavdepth.model.hints import PointHints
+from uavdepth.motion.carried_points import CarriedPoints
+from uavdepth.motion.feature_tracks import MOST_FRAMES, FeatureTracks
+from uavdepth.motion.triangulation import triangulate
+from uavdepth.motion.turn_check import TurnCheck
+from uavdepth.motion.vehicle_motion import CameraMotion, VehicleMotion
 
 _TRACKING_WIDTH = 640
 """Wider pictures are made smaller: the time that more pixels take is not worth what they tell. Half of it

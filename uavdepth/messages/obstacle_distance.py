@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uavdepth.autopilot_profile import ARDUPILOT, AutopilotProfile
 from uavdepth.errors import ScanError
-from uavdepth.obstacle_scan import SECTOR_COUNT, ObstacleScan, SectorState
+from uavdepth.messages.autopilot_profile import ARDUPILOT, AutopilotProfile
+from uavdepth.scan.obstacle_scan import SECTOR_COUNT, ObstacleScan, SectorState
 
 if TYPE_CHECKING:
     from pymavlink.dialects.v20.ardupilotmega import MAVLink_obstacle_distance_message

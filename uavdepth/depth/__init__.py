@@ -1,0 +1,1 @@
+"""Depth of a picture: the values, how they are sent, and how they are shown."""

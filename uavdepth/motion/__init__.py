@@ -1,0 +1,1 @@
+"""Points of known depth from the vehicle's own motion."""

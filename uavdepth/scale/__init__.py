@@ -1,0 +1,1 @@
+"""Metres for networks that have none of their own."""
