@@ -16,6 +16,7 @@ from service.health import SEVERITY_CRITICAL, Announcer, Vitals, state_of, troub
 from service.hold_on_loss import HoldOnLoss, Moment
 from service.link import Link
 from service.progress import Progress
+from service.side_cameras import SideCameras
 from service.status import speed_mps
 from service.trouble import Trouble
 
@@ -33,6 +34,7 @@ class Monitor:
         link: the autopilot link.
         reader: the camera.
         progress: what perception has done.
+        sides: the further cameras.
         started_ns: when the service started.
         publish: hands the status to the ground station; None if nobody listens.
         publish_period_ns: how often.
@@ -45,6 +47,7 @@ class Monitor:
         link: Link,
         reader: CameraReader,
         progress: Progress,
+        sides: SideCameras,
         started_ns: int,
         publish: Callable[[], None] | None,
         publish_period_ns: int,
@@ -54,6 +57,7 @@ class Monitor:
         self._link = link
         self._reader = reader
         self._progress = progress
+        self._sides = sides
         self._started_ns = started_ns
         self._publish = publish
         self._publish_period_ns = publish_period_ns
@@ -84,6 +88,7 @@ class Monitor:
         while not self._stopping.wait(_PERIOD_S):
             try:
                 self._judge()
+                self._sides.judge(self._clock.now_ns(), is_sending=self.trouble is None)
                 if self._publish is not None and self._clock.now_ns() >= self._publish_due_ns:
                     self._publish_due_ns = self._clock.now_ns() + self._publish_period_ns
                     self._publish()

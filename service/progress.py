@@ -8,8 +8,8 @@ from collections import deque
 import numpy as np
 
 from service.autopilot.rate_meter import RateMeter
-from service.pipeline import PerceptionResult
-from service.status import Latency
+from service.latency_advice import Latency
+from service.perception_result import PerceptionResult
 
 _REMEMBERED_DELAYS = 450
 """Half a minute of messages at 15 Hz."""

@@ -18,7 +18,7 @@ from service.frame import Frame
 from service.fresh_frames import FreshFrames
 from service.health import SEVERITY_WARNING
 from service.hold_on_loss import HoldOnLoss
-from service.latency_advice import advise
+from service.latency_advice import Latency, advise_all
 from service.latest_slot import LatestSlot
 from service.link import Link
 from service.monitor import Monitor
@@ -28,7 +28,7 @@ from service.publisher.publisher import ZenohPublisher
 from service.recorder.recorder import Recorder
 from service.settings import Settings
 from service.side_cameras import SideCameras
-from service.status import Drops, Latency, ServiceStatus, altitude_m, resident_memory_mib, speed_mps
+from service.status import Drops, ServiceStatus, altitude_m, resident_memory_mib, speed_mps
 from service.status_sample import status_sample
 from service.thread_rank import switch_quickly
 from service.trouble import Trouble
@@ -107,6 +107,7 @@ class Service:
             self._link,
             self._reader,
             self._progress,
+            self._sides,
             self._started_ns,
             self._tell_status if told else None,
             round(1e9 / settings.zenoh.status_rate_hz),
@@ -204,7 +205,8 @@ class Service:
         result, pose = progress.result, self._link.newest_pose()
         # The link tells when messages left; one that does not, when scans were taken.
         latency = progress.latency if link.obstacle_delay_ms is None else Latency(*link.obstacle_delay_ms)
-        advice = None if latency is None else advise(latency.p95_ms, self._settings.scan.max_distance_m)
+        sides = self._sides.status(now_ns)
+        latencies = (latency, *(side.latency for side in sides))
         return ServiceStatus(
             vehicle=self._settings.vehicle.name,
             uptime_s=(now_ns - self._started_ns) / 1e9,
@@ -228,8 +230,8 @@ class Service:
             memory_mib=resident_memory_mib(),
             altitude_m=altitude_m(pose),
             speed_mps=speed_mps(pose),
-            cp_delay_s=None if advice is None else advice.cp_delay_s,
-            margin_m=None if advice is None else advice.margin_m,
+            advice=advise_all(latencies, self._settings.scan.max_distance_m),
+            sides=sides,
             recording=None if record is None else record.recording,
             recording_detail="" if record is None else record.problem,
         )
@@ -259,7 +261,9 @@ class Service:
         if result.trusted and done_ns - frame.captured_ns > max_age_ns:
             result = result.distrusted(Trouble.STALE_FRAME)
         if result.trusted and self._link.send_obstacles(result.scan, frame.captured_ns):
-            self._progress.sent(frame.captured_ns, self._clock.now_ns())
+            sent_ns = self._clock.now_ns()
+            self._progress.sent(frame.captured_ns, sent_ns)
+            self._sides.sent(sent_ns)
         self._progress.measured(result, begun_ns, done_ns)
         if self._recorder is not None:
             self._recorder.offer(result, begun_ns, done_ns)

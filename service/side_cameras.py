@@ -15,11 +15,14 @@ from service.cameras.rendered import PoseSource
 from service.cameras.source import make_camera
 from service.clock import Clock
 from service.frame import Frame
+from service.health import SEVERITY_WARNING
 from service.latest_slot import LatestSlot
 from service.perception_result import PerceptionResult
 from service.pipeline import Perception
 from service.settings import ExtraCameraSettings, Settings
 from service.side_merge import SideMerge
+from service.side_watch import SideWatch
+from service.status import SideStatus
 
 log = structlog.get_logger()
 
@@ -44,6 +47,8 @@ class _Side:
     settings: Settings
     reader: CameraReader
     frames: LatestSlot[Frame]
+    watch: SideWatch
+    perception: Perception | None = None
 
 
 class SideCameras:
@@ -72,7 +77,7 @@ class SideCameras:
         record: Record | None = None,
     ) -> None:
         self._clock, self._link, self._record = clock, link, record
-        self._merge = SideMerge(settings, link.say)
+        self._merge = SideMerge(settings)
         self._stopping = threading.Event()
         self._sides: list[_Side] = []
         self._threads: list[threading.Thread] = []
@@ -83,7 +88,8 @@ class SideCameras:
                 camera = make_camera(extra.camera.source, extra.camera, clock, link, extra.mount.mount)
             frames: LatestSlot[Frame] = LatestSlot()
             own = side_settings(settings, extra)
-            self._sides.append(_Side(extra.name, own, CameraReader(camera, frames), frames))
+            watch = SideWatch(extra.name, clock.now_ns(), link.say)
+            self._sides.append(_Side(extra.name, own, CameraReader(camera, frames), frames, watch))
 
     def start(self, main: Perception) -> None:
         """Begin to read and measure, with the main camera's network.
@@ -91,10 +97,11 @@ class SideCameras:
         Raises:
             ConfigError: a mask that does not fit its camera.
         """
-        made = [(side, main.beside(side.settings)) for side in self._sides]
-        for side, perception in made:
+        for side in self._sides:
+            side.perception = main.beside(side.settings)
+        for side in self._sides:
             thread = threading.Thread(
-                target=self._perceive, args=(side, perception), name=f"side {side.name}", daemon=True
+                target=self._perceive, args=(side, side.perception), name=f"side {side.name}", daemon=True
             )
             self._threads.append(thread)
             side.reader.start()
@@ -113,6 +120,35 @@ class SideCameras:
         """The main camera's result with what the sides see; itself where it is not trusted."""
         return self._merge.added_to(result)
 
+    def sent(self, at_ns: int) -> None:
+        """Note that the newest merged scan left at `at_ns`; to be called by the thread that merges."""
+        for side in self._sides:
+            captured_ns = self._merge.used_ns.get(side.name)
+            if captured_ns is not None:
+                side.watch.progress.sent(captured_ns, at_ns)
+
+    def judge(self, now_ns: int, *, is_sending: bool) -> None:
+        """Tell the pilot of sides that are lost or back; to be called several times a second.
+
+        Args:
+            now_ns: the moment.
+            is_sending: distances are sent, with whatever sides there are.
+        """
+        for side in self._sides:
+            left_out = self._merge.left_out.get(side.name)
+            side.watch.judge(now_ns, side.reader.status, left_out, is_sending=is_sending)
+
+    def status(self, now_ns: int) -> tuple[SideStatus, ...]:
+        """Each side now."""
+        return tuple(
+            side.watch.status(
+                now_ns,
+                side.reader.status,
+                0 if side.perception is None else side.perception.model_failures,
+            )
+            for side in self._sides
+        )
+
     def _perceive(self, side: _Side, perception: Perception) -> None:
         while not self._stopping.is_set():
             frame = side.frames.take(_TAKE_S)
@@ -121,9 +157,16 @@ class SideCameras:
             try:
                 begun_ns = self._clock.now_ns()
                 result = perception.step_late(frame, self._link.telemetry_at)
-                if self._record is not None:
-                    self._record(result, begun_ns, self._clock.now_ns(), side.name)
+                done_ns = self._clock.now_ns()
                 self._merge.put(side.name, result)
+                side.watch.progress.measured(result, begun_ns, done_ns)
+                if self._record is not None:
+                    self._record(result, begun_ns, done_ns, side.name)
+                perception.look_ahead()
+                remark = perception.remark(result)
+                if remark is not None:
+                    log.warning("of a side camera", camera=side.name, remark=remark)
+                    self._link.say(SEVERITY_WARNING, f"{remark} ({side.name})")
             except Exception:
                 self._merge.put(side.name, None)
                 log.exception("a side camera's perception broke", camera=side.name, frame=frame.index)

@@ -9,24 +9,13 @@ from pathlib import Path
 from service.autopilot.link_status import LinkStatus
 from service.autopilot.service_state import ServiceState
 from service.cameras.reader import CameraStatus
+from service.latency_advice import Latency, LatencyAdvice
 from service.publisher.publisher import PublisherStatus
 from service.scale_status import ScaleStatus
 from service.telemetry import Telemetry
 from service.trouble import Trouble
 
 _MIB = 1024 * 1024
-
-
-@dataclass(frozen=True)
-class Latency:
-    """From capture to wire, over the last messages, milliseconds.
-
-    Args:
-        p50_ms, p95_ms: half and 19 of 20 messages were not slower.
-    """
-
-    p50_ms: float
-    p95_ms: float
 
 
 @dataclass(frozen=True)
@@ -40,6 +29,34 @@ class Drops:
 
     frames: int
     samples: int
+
+
+@dataclass(frozen=True)
+class SideStatus:
+    """One of `[[extra_camera]]` at one moment.
+
+    Args:
+        name: as configured.
+        used: what it sees is in the messages; in none while nothing is sent.
+        trouble: why it is missing; None if it is not, or if the service's own trouble silences all.
+        camera: what it does.
+        frames_per_s: its pictures measured, over the last seconds.
+        age_s: since its newest measured picture was taken; None before the first.
+        latency: from its capture until a message told of it, which is one of the main camera's; None before
+            the first.
+        losses: how often it was lost since the start.
+        model_failures: its pictures that the network failed on.
+    """
+
+    name: str
+    used: bool
+    trouble: Trouble | None
+    camera: CameraStatus
+    frames_per_s: float
+    age_s: float | None
+    latency: Latency | None
+    losses: int
+    model_failures: int
 
 
 @dataclass(frozen=True)
@@ -69,7 +86,8 @@ class ServiceStatus:
         speed_mps: speed over ground; None if not heard.
         recording: whether a record is being written; None where no recorder is set up.
         recording_detail: what is wrong with the record, in words; empty if nothing.
-        cp_delay_s, margin_m: CP_DELAY and margin that the measured latency asks for; None if not known.
+        advice: what the slowest camera's latency asks of the autopilot's parameters; None if not known.
+        sides: the further cameras.
     """
 
     vehicle: str
@@ -96,8 +114,8 @@ class ServiceStatus:
     speed_mps: float | None = None
     recording: bool | None = None
     recording_detail: str = ""
-    cp_delay_s: float | None = None
-    margin_m: float | None = None
+    advice: LatencyAdvice | None = None
+    sides: tuple[SideStatus, ...] = ()
 
 
 def altitude_m(telemetry: Telemetry) -> float | None:

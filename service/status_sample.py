@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from service.publisher.wire import StatusSample
-from service.status import ServiceStatus
+from service.publisher.wire import ExtraCamera, StatusSample
+from service.status import ServiceStatus, SideStatus
 
 
 def status_sample(status: ServiceStatus) -> StatusSample:
@@ -45,7 +45,25 @@ def status_sample(status: ServiceStatus) -> StatusSample:
         recording=status.recording,
         recording_detail=status.recording_detail,
         stream_profile=None if status.publisher is None else status.publisher.profile,
-        cp_delay_s=status.cp_delay_s,
-        margin_m=status.margin_m,
+        cp_delay_s=None if status.advice is None else status.advice.cp_delay_s,
+        margin_m=None if status.advice is None else status.advice.margin_m,
         memory_mib=status.memory_mib,
+        extra_cameras=tuple(_side_sample(side) for side in status.sides),
+    )
+
+
+def _side_sample(side: SideStatus) -> ExtraCamera:
+    latency = side.latency
+    return ExtraCamera(
+        name=side.name,
+        used=side.used,
+        trouble=None if side.trouble is None else side.trouble.value,
+        camera=side.camera.state.value,
+        camera_detail=side.camera.detail,
+        frames_per_s=side.frames_per_s,
+        age_s=side.age_s,
+        latency_ms_p50=None if latency is None else latency.p50_ms,
+        latency_ms_p95=None if latency is None else latency.p95_ms,
+        losses=side.losses,
+        model_failures=side.model_failures,
     )

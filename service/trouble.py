@@ -17,6 +17,8 @@ class Trouble(Enum):
     MODEL_FAILED = "depth network failed"
     LINK_LOST = "autopilot not heard"
     NO_ATTITUDE = "no attitude at picture time"
+    NO_POSITION = "position is not known or was reset"
+    """A further camera's sight cannot be carried to the main picture's place."""
     NO_HEIGHT = "no height above ground"
     NO_GROUND = "no ground seen to scale depth"
     NO_POINTS = "no points measured by motion"

@@ -202,6 +202,36 @@ class ScanSample(Stamp):
         )
 
 
+class ExtraCamera(BaseModel):
+    """A further camera whose sight is added to the scan.
+
+    Args:
+        name: as configured.
+        used: what it sees is in the messages.
+        trouble: why it is missing, in words; None if it is not, or if nothing is sent at all.
+        camera, camera_detail: its state, as of the main one.
+        frames_per_s: its pictures that were measured.
+        age_s: since its newest measured picture was taken; None before the first.
+        latency_ms_p50, latency_ms_p95: from its capture to the wire; None before the first message.
+        losses: how often it was lost since the start.
+        model_failures: its pictures that the network failed on.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
+
+    name: Words
+    used: bool
+    trouble: Words | None = None
+    camera: Words
+    camera_detail: Words = ""
+    frames_per_s: float
+    age_s: float | None = None
+    latency_ms_p50: float | None = None
+    latency_ms_p95: float | None = None
+    losses: Count = 0
+    model_failures: Count = 0
+
+
 class StatusSample(_Message):
     """The service at one moment, as a ground station shows it.
 
@@ -234,6 +264,7 @@ class StatusSample(_Message):
         stream_profile: what is sent to the ground: "full", "thin", "scan-only".
         cp_delay_s, margin_m: CP_DELAY and margin that the measured latency asks for.
         memory_mib: resident memory.
+        extra_cameras: the further cameras.
     """
 
     vehicle: Words
@@ -274,3 +305,4 @@ class StatusSample(_Message):
     cp_delay_s: float | None = None
     margin_m: float | None = None
     memory_mib: float
+    extra_cameras: tuple[ExtraCamera, ...] = Field(default=(), max_length=8)

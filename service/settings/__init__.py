@@ -41,7 +41,7 @@ class Settings(Section):
     """The whole configuration. Only `[camera] source` has no default."""
 
     camera: CameraSettings
-    extra_camera: tuple[ExtraCameraSettings, ...] = Field(default=(), strict=False)
+    extra_camera: tuple[ExtraCameraSettings, ...] = Field(default=(), strict=False, max_length=8)
     vehicle: VehicleSettings = Field(default_factory=VehicleSettings)
     mount: MountSettings = Field(default_factory=MountSettings)
     model: ModelSettings = Field(default_factory=ModelSettings)

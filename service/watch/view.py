@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from service.freshness import Freshness
-from service.publisher.wire import ScanSample, StatusSample
+from service.publisher.wire import ExtraCamera, ScanSample, StatusSample
 from service.watch.board import Board, VehicleView
 from uavdepth.scan.obstacle_scan import SectorState
 
@@ -107,9 +107,7 @@ def _status_rows(status: StatusSample | None) -> RenderableType:
     state = Text(status.state, style=_STATE_STYLES.get(status.state, "bold red"))
     if status.trouble:
         state.append(f" ({status.trouble})")
-    latency = "-"
-    if status.latency_ms_p50 is not None and status.latency_ms_p95 is not None:
-        latency = f"{status.latency_ms_p50:.0f} / {status.latency_ms_p95:.0f} ms"
+    latency = _latency(status.latency_ms_p50, status.latency_ms_p95)
     scale = "-"
     if status.scale_factor is not None and status.scale_relative_sigma is not None:
         scale = f"{status.scale_factor:.2f} ±{100 * status.scale_relative_sigma:.0f} %"
@@ -126,6 +124,8 @@ def _status_rows(status: StatusSample | None) -> RenderableType:
     if status.obstacle_rate_hz is not None:
         messages += f", {status.obstacle_rate_hz:.1f}/s"
     table.add_row("camera", escape(status.camera), "messages", messages)
+    for extra in status.extra_cameras:
+        table.add_row(f"camera {escape(extra.name)}", _extra_camera(extra), "latency", _latency_of(extra))
     table.add_row(
         "altitude", _with_unit(status.altitude_m, "m"), "speed", _with_unit(status.speed_mps, "m/s")
     )
@@ -135,9 +135,34 @@ def _status_rows(status: StatusSample | None) -> RenderableType:
         table.add_row(
             "record", "recording" if status.recording else Text("NOT RECORDING", style="bold yellow")
         )
-    details = (status.camera_detail, status.link_detail, status.recording_detail, status.scale_suspicion)
+    details = (
+        status.camera_detail,
+        *(extra.camera_detail for extra in status.extra_cameras),
+        status.link_detail,
+        status.recording_detail,
+        status.scale_suspicion,
+    )
     notes = [text for text in details if text]
     return Group(table, *(Text(note, style="yellow") for note in notes))
+
+
+def _extra_camera(extra: ExtraCamera) -> Text:
+    """`delivering, 14.8/s` and, where it is so, why it is missing from the messages."""
+    words = Text(f"{extra.camera}, {extra.frames_per_s:.1f}/s")
+    if extra.trouble is not None:
+        words.append(f", OFF: {extra.trouble}", style="bold yellow")
+    if extra.losses:
+        words.append(f", lost {extra.losses} times" if extra.losses > 1 else ", lost once", style="yellow")
+    return words
+
+
+def _latency_of(extra: ExtraCamera) -> str:
+    age = "" if extra.age_s is None else f", picture {extra.age_s:.1f} s old"
+    return _latency(extra.latency_ms_p50, extra.latency_ms_p95) + age
+
+
+def _latency(p50_ms: float | None, p95_ms: float | None) -> str:
+    return "-" if p50_ms is None or p95_ms is None else f"{p50_ms:.0f} / {p95_ms:.0f} ms"
 
 
 def _with_unit(value: float | None, unit: str) -> str:

@@ -105,7 +105,9 @@ def test_a_picture_that_cannot_be_decoded_is_left_out(running: RunningStation, t
 
 
 def test_obstacle_clear_and_unknown_are_told_apart(running: RunningStation, tab: Tab) -> None:
-    crow = Vehicle(running.vehicles, "crow")
+    side = {"name": "left", "used": False, "camera": "lost", "frames_per_s": 0.0}
+    side["trouble"] = "no pictures from the camera"
+    crow = Vehicle(running.vehicles, "crow", {"extra_cameras": [side]})
     say: list[dict[str, object]] = [{"distance_m": 3.46}]
     with Talk(lambda: crow.say(**say[0])):  # type: ignore[arg-type]
         tab.open(f"{running.url}/#vehicle=crow")
@@ -115,6 +117,8 @@ def test_obstacle_clear_and_unknown_are_told_apart(running: RunningStation, tab:
         for words in ("GUIDED", "±5 %", "61 ms", "kB/s", "3.4 m", "14.6 /s"):
             assert words in tab.text("#facts")
         assert tab.text("#recording").strip() == "REC"
+        assert "left OFF" in tab.text("#facts")
+        assert tab.text("#trouble") == "camera left OFF: no pictures from the camera"
         say[0] = {"distance_m": None}
         tab.wait_for(is_text("#nearest", "> 20"))
         assert "where it sees (85° of 360°)" in tab.text("#nearest-words")

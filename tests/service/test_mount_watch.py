@@ -11,6 +11,7 @@ from structlog.testing import capture_logs
 
 from service.frame import Frame
 from service.mount_watch import MountWatch
+from service.settings import Settings
 from service.telemetry import Telemetry
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraMount
@@ -24,11 +25,11 @@ CAMERA = SETTINGS.camera.model
 class Sky:
     """A turn on the spot above level ground by a vehicle whose camera really sits at `true`."""
 
-    def __init__(self, true: CameraMount) -> None:
+    def __init__(self, true: CameraMount, settings: Settings = SETTINGS) -> None:
         self.true = true
         self.asked = 0
         self.error: Exception | None = None
-        self.watch = MountWatch(SETTINGS, self.infer)
+        self.watch = MountWatch(settings, self.infer)
 
     def attitude(self, seconds: float) -> Attitude:
         return Attitude(0.03 * math.sin(seconds), 0.03 * math.cos(2 * seconds), 0.15 * seconds)
@@ -63,6 +64,13 @@ def test_a_camera_that_looks_lower_than_configured_is_told_once() -> None:
     assert sky.watch.verdict is not None
     assert sky.watch.verdict.state is MountState.DIFFERS
     assert sky.watch.verdict.pitch_deg == pytest.approx(-21.0, abs=0.5)
+
+
+def test_a_camera_to_the_side_is_judged_as_well() -> None:
+    settings = make_settings("mount.pitch_deg=-15", "mount.yaw_deg=90", "mount.check_every_s=2")
+    said = Sky(CameraMount(pitch_deg=-21.0, yaw_deg=90.0), settings).fly(90.0)
+    assert said == ["uavdepth: mount pitch -21 roll 0 by ground"]
+    assert Sky(CameraMount(pitch_deg=-15.0, yaw_deg=90.0), settings).fly(90.0) == []
 
 
 def test_a_camera_as_configured_is_no_news_for_the_pilot() -> None:

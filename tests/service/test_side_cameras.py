@@ -23,17 +23,23 @@ from program_fakes import (
 )
 
 from service.cameras.camera import Camera
+from service.cameras.reader import CameraState, CameraStatus
 from service.clock import MonotonicClock
 from service.errors import CameraError, ConfigError
 from service.frame import Frame
-from service.perception_result import PerceptionResult
+from service.health import SEVERITY_WARNING
+from service.perception_result import PerceptionResult, unknown_scan
 from service.pipeline import Perception, make_scanner
+from service.publisher.wire import StatusSample
 from service.replay.open_footage import open_flight
 from service.run import Service
 from service.settings import ExtraCameraSettings, Settings
 from service.settings.load import load_settings
 from service.settings.reference import reference_markdown
 from service.side_cameras import SideCameras
+from service.side_watch import SideWatch
+from service.status import SideStatus
+from service.status_sample import status_sample
 from service.telemetry import Telemetry
 from service.trouble import Trouble
 from uavdepth.attitude import Attitude
@@ -138,18 +144,100 @@ def test_a_side_is_not_carried_over_a_jump_of_the_position(
         assert sides.added_to(jumped).scan.state[RIGHT] == state
 
 
-def test_a_side_that_dies_is_unknown_and_the_pilot_is_told() -> None:
+def test_a_side_that_dies_in_flight_is_unknown_and_in_the_status() -> None:
     link = FakeLink(MonotonicClock())
     with looking(link, endless([picture()] * 20 + [CameraError("unplugged")])) as (sides, perception):
-        wait_until(lambda: sides.added_to(look(perception, link)).scan.state[RIGHT] == SectorState.OBSTACLE)
 
-        def is_lost() -> bool:
+        def sends() -> int:
             result = sides.added_to(look(perception, link))
             assert result.trusted
-            return any(text == "uavdepth: camera right OFF" for _, text in link.said)
+            now_ns = link.clock.now_ns()
+            sides.sent(now_ns)
+            sides.judge(now_ns, is_sending=True)
+            return int(result.scan.state[RIGHT])
 
-        wait_until(is_lost)
-        assert sides.added_to(look(perception, link)).scan.state[RIGHT] == SectorState.UNKNOWN
+        wait_until(lambda: sends() == SectorState.OBSTACLE)
+        (side,) = sides.status(link.clock.now_ns())
+        assert (side.name, side.used, side.trouble) == ("right", True, None)
+        assert side.latency is not None
+        assert side.age_s is not None
+        assert side.frames_per_s > 0
+        wait_until(lambda: sends() == SectorState.UNKNOWN and bool(link.said))
+        assert link.said == [(SEVERITY_WARNING, "uavdepth: camera right OFF")]
+        (side,) = sides.status(link.clock.now_ns())
+        assert (side.used, side.trouble, side.losses) == (False, Trouble.CAMERA_LOST, 1)
+        assert side.camera.detail
+
+
+def test_what_seems_wrong_with_a_sides_mount_is_told_with_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Perception, "remark", lambda _self, _result: "uavdepth: mount pitch -21 roll 0")
+    link = FakeLink(MonotonicClock())
+    with looking(link, endless()):
+        wait_until(lambda: bool(link.said))
+    assert link.said[0] == (SEVERITY_WARNING, "uavdepth: mount pitch -21 roll 0 (right)")
+
+
+class Bystander:
+    """A side that is judged twenty times a second in a time of its own."""
+
+    def __init__(self) -> None:
+        self.now_ns = 0
+        self.said: list[str] = []
+        self.watch = SideWatch("right", 0, lambda _severity, text: self.said.append(text))
+        self.camera = CameraStatus(CameraState.DELIVERING, "", 1, 0)
+
+    def goes_on(
+        self,
+        seconds: float,
+        trouble: Trouble | None = None,
+        left_out: Trouble | None = None,
+        *,
+        is_sending: bool = False,
+        delivers: bool = True,
+    ) -> SideStatus:
+        for _ in range(round(seconds * 20)):
+            self.now_ns += 50_000_000
+            if delivers:
+                self.camera = replace(self.camera, newest_ns=self.now_ns)
+                result = PerceptionResult(
+                    Frame(picture(), self.now_ns, 0), Telemetry(0), None, None, unknown_scan(0.2, 20), trouble
+                )
+                self.watch.progress.measured(result, self.now_ns, self.now_ns)
+            if is_sending and delivers and trouble is None and left_out is None:
+                self.watch.progress.sent(self.now_ns, self.now_ns)
+            self.watch.judge(self.now_ns, self.camera, left_out, is_sending=is_sending)
+        return self.watch.status(self.now_ns, self.camera, 0)
+
+
+def test_a_side_that_is_dead_before_take_off_is_told_on_the_ground() -> None:
+    side = Bystander()
+    side.camera = CameraStatus(CameraState.LOST, "no such device", 0, 0)
+    assert side.goes_on(2.0, delivers=False).trouble is Trouble.CAMERA_LOST
+    assert side.said == ["uavdepth: camera right OFF"]
+
+
+def test_a_side_that_only_waits_for_take_off_as_all_do_is_not_told() -> None:
+    side = Bystander()
+    assert side.goes_on(5.0, Trouble.NO_POINTS).trouble is None
+    assert side.goes_on(5.0).trouble is None  # it is ready, and the main camera is not
+    assert side.said == []
+
+
+@pytest.mark.parametrize(
+    "missing", [{"trouble": Trouble.NO_POINTS}, {"left_out": Trouble.NO_POSITION}, {"delivers": False}]
+)
+def test_a_side_that_is_missing_from_what_is_sent_is_told_once_and_when_it_is_back(
+    missing: dict[str, Any],
+) -> None:
+    side = Bystander()
+    assert side.goes_on(2.0, is_sending=True).used
+    assert side.goes_on(1.0, is_sending=True, **missing).losses == 0  # it may be a flicker
+    missed = side.goes_on(5.0, is_sending=True, **missing)
+    assert not missed.used
+    assert missed.trouble is missing.get("trouble", missing.get("left_out", Trouble.CAMERA_LOST))
+    assert missed.losses == 1
+    assert side.goes_on(2.0, is_sending=True).used
+    assert side.said == ["uavdepth: camera right OFF", "uavdepth: camera right ON"]
 
 
 def test_a_main_camera_in_trouble_silences_all() -> None:
@@ -176,6 +264,11 @@ def test_the_service_sends_and_records_what_all_cameras_see(
     service.start()
     try:
         wait_until(lambda: any(scan.state[RIGHT] == SectorState.OBSTACLE for scan, _ in link.sent[-5:]))
+        wait_until(lambda: service.status().sides[0].used)
+        sample = StatusSample.decode(status_sample(service.status()).encode())
+        assert [(extra.name, extra.camera) for extra in sample.extra_cameras] == [("right", "delivering")]
+        assert sample.extra_cameras[0].latency_ms_p95 is not None
+        assert sample.cp_delay_s is not None
     finally:
         service.stop()
     scan = link.sent[-1][0]

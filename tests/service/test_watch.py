@@ -134,6 +134,24 @@ def test_what_the_vehicle_advises_and_records_is_shown() -> None:
         assert words in text
 
 
+def test_further_cameras_are_shown_each_with_its_trouble() -> None:
+    board = Board()
+    well = {"name": "left", "used": True, "camera": "delivering", "frames_per_s": 14.6, "age_s": 0.07}
+    well |= {"latency_ms_p50": 92.0, "latency_ms_p95": 121.0}
+    dead = {"name": "right", "used": False, "camera": "lost", "frames_per_s": 0.0, "losses": 1}
+    dead |= {"trouble": "no pictures from the camera", "camera_detail": "camera 2: unplugged"}
+    board.hear("uavdepth/kite/status", status_bytes(extra_cameras=[well, dead]), 0)
+    text = text_of(board, 0)
+    for words in (
+        "camera left",
+        "delivering, 14.6/s",
+        "92 / 121 ms, picture 0.1 s old",
+        "lost, 0.0/s, OFF: no pictures from the camera, lost once",
+        "camera 2: unplugged",
+    ):
+        assert words in text
+
+
 def test_nothing_near_and_not_trusted_read_differently() -> None:
     board = Board()
     board.hear("uavdepth/kite/scan", scan_bytes(None), 0)

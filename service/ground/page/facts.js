@@ -9,9 +9,15 @@ const TILES = [
   ["Scale", scale],
   ["Latency", latency],
   ["Link", link],
-  ["Vision", (s) => [`${fixed(s.frames_per_s, 1)} /s`, `camera ${s.camera}`]],
+  ["Vision", (s) => [`${fixed(s.frames_per_s, 1)} /s`, [`camera ${s.camera}`, ...(s.extra_cameras ?? []).map(extra)].join(", ")]],
   ["MAVLink", mavlink],
 ];
+
+function extra(camera) {
+  if (camera.trouble !== null) return `${camera.name} OFF`;
+  const late = isNumber(camera.latency_ms_p95) ? ` ${fixed(camera.latency_ms_p95, 0)} ms` : "";
+  return `${camera.name} ${fixed(camera.frames_per_s, 1)} /s${late}`;
+}
 
 function scale(s) {
   if (!isNumber(s.scale_factor)) return ["none", "no metres"];

@@ -118,6 +118,10 @@ export class VehiclePanel {
     if (this.#detail !== null && !this.#detail.alive) notes.push("its session is gone");
     if (scan !== null && !scan.trusted) notes.push(`no distances: ${scan.trouble ?? "not trusted"}`);
     else if (status?.trouble) notes.push(status.trouble);
+    for (const extra of status?.extra_cameras ?? []) {
+      if (extra.trouble !== null) notes.push(`camera ${extra.name} OFF: ${extra.trouble}`);
+      if (extra.camera_detail) notes.push(extra.camera_detail);
+    }
     for (const words of [
       status?.link_detail,
       status?.camera_detail,
