@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
 from uavdepth.errors import ImageSizeError
+from uavdepth.scale.ground_doubt import doubt_of_slope, doubt_of_surface
 from uavdepth.scan.body_rays import body_rays
 
 MIN_HEIGHT_M = 0.3
@@ -52,9 +53,6 @@ _LARGEST_SPREAD = 0.2
 _SLOPES = (0.65, 1.4)
 """Of log depth over log of the plane's depth. Level ground has 1, a wall 0; ground that falls or rises
 by 12 % lies at these ends, and there the factor is wrong by a quarter."""
-
-_SIGMA_OF_SLOPE = 0.5
-"""Error of the factor for each unit that the slope is off 1, measured on planes that fall and rise."""
 
 _MIN_LOG_REACH = 0.06
 _FLOOR_SIGMA = 0.02
@@ -151,7 +149,7 @@ class GroundScaler:
             return None
         if not (math.isfinite(attitude.roll_rad) and math.isfinite(attitude.pitch_rad)):
             return None
-        log_plane, log_ratio, tile = self._ratios(np.asarray(depth_m), attitude, height_m)
+        log_plane, log_ratio, tile, endless = self._ratios(np.asarray(depth_m), attitude, height_m)
         if log_ratio.size < _MIN_PIXELS:
             return None
         # A network that is not metric may count in any unit: factors are searched around its own.
@@ -161,26 +159,30 @@ class GroundScaler:
             return None
         mode += float(centre)
         near = np.abs(log_ratio - np.float32(mode)) < _GATE
+        seen_plane, seen_ratio = log_plane, log_ratio
         log_plane, log_ratio, tile = log_plane[near], log_ratio[near], tile[near]
         log_factor, gate = _refine(log_ratio, mode)
         if not self._plausible[0] <= math.exp(log_factor) <= self._plausible[1]:
             return None
         ground = np.abs(log_ratio - np.float32(log_factor)) < gate
-        if log_plane[ground].std() < _MIN_LOG_REACH:
+        reach = float(log_plane[ground].std())
+        if reach < _MIN_LOG_REACH:
             return None
         slope = _slope(log_plane, log_plane - log_ratio)
         if not _SLOPES[0] <= slope <= _SLOPES[1]:
             return None
-        spread = _spread(log_ratio - np.float32(log_factor), tile)
-        if spread is None or spread > _LARGEST_SPREAD:
+        spread, tiles = _spread(log_ratio - np.float32(log_factor), tile)
+        if tiles < _MIN_TILES or spread > _LARGEST_SPREAD:
             return None
-        sigma = math.hypot(_FLOOR_SIGMA, spread, _SIGMA_OF_SLOPE * (slope - 1.0))
+        surface = doubt_of_surface(seen_plane, seen_ratio - np.float32(log_factor), _GATE, endless)
+        sigma = math.hypot(_FLOOR_SIGMA, spread, doubt_of_slope(slope, reach, spread, tiles), surface)
         return GroundScale(math.exp(log_factor), sigma, int(log_ratio.size))
 
     def _ratios(
         self, depth: NDArray[np.floating], attitude: Attitude, height_m: float
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.intp]]:
-        """Log plane depth, log of plane over network, and tile of the pixels that look at the ground."""
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.intp], int]:
+        """Log plane depth, log of plane over network, and tile of the pixels that look at the ground; and how
+        many more would, but see no end."""
         level = attitude.level_from_body
         camera_height = height_m - float(level[2] @ self.mount.position_body_m)
         start = self._stride // 2
@@ -190,10 +192,11 @@ class GroundScaler:
         looks = down > np.float32(max(camera_height, 1e-3) / MAX_PLANE_DEPTH_M)
         looks &= down < np.float32(camera_height / MIN_PLANE_DEPTH_M)
         looks &= down * self._per_length > np.float32(MIN_DEPRESSION)
+        endless = int(np.count_nonzero(looks & np.isposinf(sparse)))
         looks &= (sparse > 0) & (sparse < np.inf)
         pixel = np.flatnonzero(looks)
         log_plane = np.float32(math.log(max(camera_height, 1e-3))) - np.log(down[pixel])
-        return log_plane, log_plane - np.log(sparse[pixel]), self._tile[pixel]
+        return log_plane, log_plane - np.log(sparse[pixel]), self._tile[pixel], endless
 
 
 def _mode(log_ratio: NDArray[np.float32]) -> float | None:
@@ -237,14 +240,15 @@ def _slope(log_plane: NDArray[np.float32], log_depth: NDArray[np.float32]) -> fl
     return float(spread @ log_depth) / float(spread @ spread)
 
 
-def _spread(error: NDArray[np.float32], tile: NDArray[np.intp]) -> float | None:
-    """How far the picture's tiles are apart, as one standard deviation, or None for too few tiles.
+def _spread(error: NDArray[np.float32], tile: NDArray[np.intp]) -> tuple[float, int]:
+    """How far the picture's tiles are apart, as one standard deviation, and how many there are.
 
     It is not divided by the number of tiles: neighbouring tiles err together.
     """
     counts = np.bincount(tile, minlength=_TILES**2)
     filled = counts >= _MIN_TILE_PIXELS
-    if np.count_nonzero(filled) < _MIN_TILES:
-        return None
+    tiles = int(np.count_nonzero(filled))
+    if not tiles:
+        return math.inf, 0
     sums = np.bincount(tile, weights=error, minlength=_TILES**2)
-    return 1.4826 * _median(np.abs(sums[filled] / counts[filled]))
+    return 1.4826 * _median(np.abs(sums[filled] / counts[filled])), tiles
