@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from service.doctor.flight_modes import Effect, find_mode
+from service.position_jump import has_jumped
+from service.status import speed_mps
+from service.telemetry import Telemetry
 from service.trouble import Trouble
 
 HOLD_AFTER_NS = 700_000_000
@@ -12,12 +16,15 @@ HOLD_AFTER_NS = 700_000_000
 the earliest (measured)."""
 
 _WATCHED_NS = 5_000_000_000
-"""A vehicle that begins to move so soon after the loss was held by what is lost."""
+"""So long after the loss a vehicle without metres, or one that is not heard, may still be asked."""
 
 _NEVER_STOPPED = frozenset({"LAND"})
 """Every landing loses its metres near the ground: stopped there, the vehicle would hang in the air."""
 
 _MOVING_MPS = 0.5
+_CREPT_M = 1.0
+"""A way since the loss that is no hovering in gusts any more, and half of the margin that is kept."""
+
 _RECOVERED_NS = 3_000_000_000
 """Distances must have been sent for so long before a new loss may lead to a new request."""
 
@@ -31,23 +38,29 @@ class Moment:
         trouble: why no distances are sent, None if they are.
         sent_ns: when distances were sent last; None if never.
         protected: armed, and given distances since.
+        heard: the autopilot is.
         armed: the vehicle's motors.
-        autopilot, mode: of the vehicle; None if not heard.
-        speed_mps: over ground; None if not known.
+        autopilot, mode: of the vehicle; None if not known.
+        pose: where it is and how fast, as far as known.
     """
 
     now_ns: int
     trouble: Trouble | None
     sent_ns: int | None
     protected: bool
+    heard: bool
     armed: bool | None
     autopilot: str | None
     mode: str | None
-    speed_mps: float | None
+    pose: Telemetry
 
 
 class HoldOnLoss:
-    """Asks once for each loss, for a moving armed vehicle in a mode that distances act in.
+    """Asks once for each loss, for an armed vehicle that moves in a mode that distances act in.
+
+    A vehicle moves if it is fast, or has come a metre without distances. Where a part of the service has
+    failed, one that hovers is watched until it moves, however late. Where only metres are missing it is
+    watched for 5 s: moving is how they come back, and who hovers long has none.
 
     Who has chosen another mode since flies: nothing is asked of a pilot who has taken over, until the vehicle
     has been armed again or distances have been sent for 3 s.
@@ -58,6 +71,12 @@ class HoldOnLoss:
         """The mode that distances acted in while they were sent; None if none did."""
         self._is_over = False
         self._well_since_ns: int | None = None
+        self._way = _Way()
+
+    @property
+    def way_m(self) -> float:
+        """How far the vehicle has come since 0.7 s after the last distances, horizontally."""
+        return self._way.length_m
 
     def hear(self, moment: Moment) -> bool:
         """Whether to ask now."""
@@ -68,17 +87,23 @@ class HoldOnLoss:
             self._on_well(moment)
             return False
         self._well_since_ns = None
-        if self._is_over or not self._was_protecting(moment):
+        silent_ns = moment.now_ns - (moment.sent_ns or 0)
+        if silent_ns < HOLD_AFTER_NS:
+            self._way.begin(moment.pose)
+        else:
+            self._way.go_on(moment.pose)
+        if self._is_over or self._mode_before is None:
+            return False
+        if not moment.heard or moment.mode is None:
+            self._is_over = silent_ns > _WATCHED_NS  # nobody knows what the pilot does meanwhile
             return False
         if moment.mode != self._mode_before:
             self._is_over = True  # the pilot has acted
             return False
-        silent_ns = moment.now_ns - (moment.sent_ns or 0)
-        if silent_ns > _WATCHED_NS:
-            self._is_over = True
+        is_watched = moment.trouble.is_fault or silent_ns <= _WATCHED_NS
+        if not moment.protected or silent_ns < HOLD_AFTER_NS or not is_watched:
             return False
-        is_moving = moment.speed_mps is not None and moment.speed_mps >= _MOVING_MPS
-        if silent_ns < HOLD_AFTER_NS or not is_moving:
+        if not self._is_moving(moment.pose):
             return False
         self._is_over = True
         return True
@@ -90,13 +115,38 @@ class HoldOnLoss:
             self._is_over = False
         self._mode_before = moment.mode if _acts(moment.autopilot, moment.mode) else None
 
-    def _was_protecting(self, moment: Moment) -> bool:
-        return (
-            self._mode_before is not None
-            and moment.protected
-            and moment.mode is not None
-            and moment.trouble is not Trouble.LINK_LOST
-        )
+    def _is_moving(self, pose: Telemetry) -> bool:
+        speed = speed_mps(pose)
+        return (speed is not None and speed >= _MOVING_MPS) or self._way.length_m >= _CREPT_M
+
+
+class _Way:
+    """From where the vehicle was at one moment to where it is; a reset of its position is no way."""
+
+    def __init__(self) -> None:
+        self._last: Telemetry | None = None
+        self._north_m = self._east_m = 0.0
+
+    @property
+    def length_m(self) -> float:
+        """As the crow flies, horizontally."""
+        return math.hypot(self._north_m, self._east_m)
+
+    def begin(self, pose: Telemetry) -> None:
+        """Start here."""
+        self._last = None
+        self._north_m = self._east_m = 0.0
+        self.go_on(pose)
+
+    def go_on(self, pose: Telemetry) -> None:
+        """The vehicle is here now; a pose without a position says nothing."""
+        last = self._last
+        if pose.position_ned_m is None or (last is not None and pose.at_ns <= last.at_ns):
+            return
+        if last is not None and last.position_ned_m is not None and not has_jumped(last, pose):
+            self._north_m += pose.position_ned_m[0] - last.position_ned_m[0]
+            self._east_m += pose.position_ned_m[1] - last.position_ned_m[1]
+        self._last = pose
 
 
 def _acts(autopilot: str | None, mode: str | None) -> bool:

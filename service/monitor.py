@@ -130,16 +130,24 @@ class Monitor:
             self.trouble,
             vitals.sent_ns,
             vitals.protected,
+            link.connected,
             link.armed,
             link.autopilot,
             link.mode,
-            speed_mps(self._link.newest_pose()),
+            self._link.newest_pose(),
         )
         if on_loss.hear(moment):
             mode = self._link.hold()
             text = f"uavdepth: asks for {mode}" if mode else "uavdepth: knows no mode that stops this vehicle"
             self._link.say(SEVERITY_CRITICAL, text)
-            log.warning("asks the vehicle to hold", mode=mode, because=self.trouble, flown_in=moment.mode)
+            log.warning(
+                "asks the vehicle to hold",
+                mode=mode,
+                because=self.trouble and self.trouble.value,
+                flown_in=moment.mode,
+                speed_mps=speed_mps(moment.pose),
+                way_m=round(on_loss.way_m, 2),
+            )
         if link.hold is not self._hold_told:
             self._hold_told = link.hold
             if link.hold in (HoldOutcome.REFUSED, HoldOutcome.UNANSWERED):

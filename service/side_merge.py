@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 
 from service.perception_result import PerceptionResult
 from service.pipeline import pose_of
+from service.position_jump import has_jumped
 from service.settings import Settings
-from service.telemetry import Telemetry
 from service.trouble import Trouble
 from uavdepth.scan.merge import merge_scans
 from uavdepth.scan.motion import moved_scan
 from uavdepth.scan.obstacle_scan import ObstacleScan
-
-_LARGEST_JUMP_M = 0.5
-"""Positions that part further from the way that the velocity tells were reset in between."""
 
 
 class SideMerge:
@@ -67,21 +63,7 @@ class SideMerge:
         if abs(main.captured_ns - seen.captured_ns) > self._max_age_ns:
             return Trouble.STALE_FRAME
         here, then = pose_of(main.telemetry), pose_of(seen.telemetry)
-        if here is None or then is None or _was_reset(seen.telemetry, main.telemetry):
+        if here is None or then is None or has_jumped(seen.telemetry, main.telemetry):
             return Trouble.NO_POSITION
         turned_rad, moved_m = then.motion_to(here)
         return moved_scan(seen.scan, turned_rad, moved_m)
-
-
-def _was_reset(first: Telemetry, second: Telemetry) -> bool:
-    """Whether the autopilot's positions jumped between two moments, or are those of another start."""
-    if first.epoch != second.epoch:
-        return True
-    before, after = first.position_ned_m, second.position_ned_m
-    start_mps, end_mps = first.velocity_ned_mps, second.velocity_ned_mps
-    if before is None or after is None or start_mps is None or end_mps is None:
-        return False
-    half_s = 0.5e-9 * (second.at_ns - first.at_ns)
-    flown = [half_s * (start + end) for start, end in zip(start_mps, end_mps, strict=True)]
-    north_m, east_m = (after[axis] - before[axis] - flown[axis] for axis in (0, 1))
-    return not math.hypot(north_m, east_m) <= _LARGEST_JUMP_M

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -31,6 +32,7 @@ from service.hold_on_loss import HoldOnLoss, Moment
 from service.pipeline import Perception
 from service.run import Service
 from service.settings import Settings
+from service.telemetry import Telemetry
 from service.trouble import Trouble
 from uavdepth.camera import CameraModel
 from uavdepth.depth.depth_map import DepthMap
@@ -40,16 +42,20 @@ from uavdepth.scan.scanner import ObstacleScanner
 LAST_MESSAGE_NS = 10 * S
 
 
-def well(at_ns: int = LAST_MESSAGE_NS, **values: Any) -> Moment:
+def well(
+    at_ns: int = LAST_MESSAGE_NS, speed_mps: float | None = 3.0, north_m: float = 0.0, **values: Any
+) -> Moment:
     """Distances are sent; a moving, armed ArduCopter in LOITER."""
+    velocity = None if speed_mps is None else (speed_mps, 0.0, 0.0)
     known: dict[str, Any] = {
         "trouble": None,
         "sent_ns": at_ns,
         "protected": True,
+        "heard": True,
         "armed": True,
         "autopilot": "ardupilot",
         "mode": "LOITER",
-        "speed_mps": 3.0,
+        "pose": Telemetry(at_ns, position_ned_m=(north_m, 0.0, -5.0), velocity_ned_mps=velocity),
     }
     return Moment(at_ns, **{**known, **values})
 
@@ -87,7 +93,7 @@ class TestWhenItIsAsked:
             {"protected": False},
             {"speed_mps": 0.2},
             {"speed_mps": None},
-            {"trouble": Trouble.LINK_LOST},
+            {"heard": False},
         ],
     )
     def test_nothing_is_asked_of_a_vehicle_that_was_not_protected_or_does_not_move(
@@ -119,8 +125,42 @@ class TestWhenItIsAsked:
         assert asked(well(speed_mps=0.0), *still, on_loss=on_loss) == 0
         assert asked(lost(2.0, speed_mps=0.6), on_loss=on_loss) == 1
 
-    def test_who_flies_on_by_hand_five_seconds_later_is_left_alone(self) -> None:
-        assert asked(well(speed_mps=0.0), lost(4.9, speed_mps=0.0), lost(6.0), lost(7.0)) == 0
+    @pytest.mark.parametrize(
+        ("trouble", "count"),
+        [
+            (Trouble.CAMERA_LOST, 1),
+            (Trouble.STALLED, 1),
+            (Trouble.OLD_SCALE, 0),  # moving is how metres come back
+            (Trouble.NO_HEIGHT, 0),
+        ],
+    )
+    def test_who_hovers_while_a_part_has_failed_is_asked_once_whenever_it_moves(
+        self, trouble: Trouble, count: int
+    ) -> None:
+        hovers = [lost(0.7 + 0.5 * k, speed_mps=0.1, trouble=trouble) for k in range(60)]
+        moves = [lost(31.0 + 0.1 * k, trouble=trouble) for k in range(20)]
+        assert asked(well(speed_mps=0.0), *hovers) == 0
+        assert asked(well(speed_mps=0.0), *hovers, *moves) == count
+
+    def test_who_creeps_is_asked_after_a_metre(self) -> None:
+        creeps = [lost(0.05 * k, speed_mps=0.3, north_m=0.015 * k) for k in range(200)]
+        way_m = [0.015 * k for k in range(200) if asked(well(speed_mps=0.3), *creeps[: k + 1])]
+        assert way_m[0] == pytest.approx(0.7 * 0.3 + 1.0, abs=0.03)
+
+    def test_gusts_and_a_reset_of_the_position_are_no_way(self) -> None:
+        gusts = [lost(0.1 * k, speed_mps=0.3, north_m=0.4 * math.sin(k)) for k in range(300)]
+        elsewhere = [lost(30.0 + 0.1 * k, speed_mps=0.3, north_m=7.0) for k in range(300)]
+        assert asked(well(speed_mps=0.0), *gusts, *elsewhere) == 0
+
+    def test_who_has_stopped_by_himself_is_not_asked(self) -> None:
+        brakes = [lost(0.05 * k, speed_mps=3.0 - 0.22 * k, north_m=0.1 * k) for k in range(14)]
+        stands = [lost(0.7 + 0.1 * k, speed_mps=0.0, north_m=1.3) for k in range(100)]
+        assert asked(well(), *brakes, *stands) == 0
+
+    def test_a_vehicle_that_was_not_heard_for_long_may_have_another_wish_by_now(self) -> None:
+        hovers, unheard = lost(2.0, speed_mps=0.0), {"heard": False, "speed_mps": None}
+        assert asked(well(speed_mps=0.0), hovers, lost(3.0, **unheard), lost(4.0)) == 1
+        assert asked(well(speed_mps=0.0), hovers, lost(3.0, **unheard), lost(9.0, **unheard), lost(10.0)) == 0
 
     def test_a_pilot_who_has_changed_the_mode_is_not_asked_even_back_in_the_first_mode(self) -> None:
         assert asked(well(), lost(0.5, mode="STABILIZE"), lost(0.8), lost(1.5)) == 0
