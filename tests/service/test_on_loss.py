@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hold_flight import HoldFlight
 from hold_talk import MS, S, Talk
 from link_support import Voice
 from numpy.typing import NDArray
@@ -116,7 +117,7 @@ class TestWhenItIsAsked:
         ],
     )
     def test_only_in_modes_that_distances_act_in(self, autopilot: str, mode: str, count: int) -> None:
-        values = {"autopilot": autopilot, "mode": mode}
+        values: dict[str, Any] = {"autopilot": autopilot, "mode": mode}
         assert asked(well(**values), lost(1.0, **values)) == count
 
     def test_a_vehicle_that_was_held_at_the_wall_is_asked_when_it_begins_to_move(self) -> None:
@@ -242,15 +243,44 @@ def sees_a_wall(settings: Settings) -> Perception:
 @pytest.mark.parametrize(
     ("flavor", "parameters", "flown_in", "stopped_in"),
     [
-        ("ardupilot", {"PRX_FILT": 0.0}, "LOITER", "BRAKE"),
+        ("ardupilot", {"ARMING_SKIPCHK": -1.0}, "LOITER", "BRAKE"),
         ("px4", {"CP_DIST": 3.0}, "POSCTL", "AUTO.LOITER"),
     ],
 )
-def test_a_camera_that_dies_in_flight_stops_the_vehicle_and_a_pilot_who_takes_over_flies(
+def test_a_vehicle_that_flies_when_a_camera_dies_is_stopped_in_its_own_way(
     flavor: Any, parameters: dict[str, float], flown_in: str, stopped_in: str
 ) -> None:
+    flight = HoldFlight(flavor, flown_in, **parameters)
+    flight.fly(5.0, stick=0.5)
+    assert flight.speed_mps > 1.0
+    flight.trouble = Trouble.CAMERA_LOST
+    flight.fly(4.0, stick=0.5)
+    assert flight.controller.mode == stopped_in
+    assert flight.speed_mps < 0.3
+    assert len(flight.asked) == 1
+
+
+@pytest.mark.parametrize("stick", [0.05, 0.5])
+def test_a_hovering_vehicle_is_held_once_when_it_sets_out_without_distances(stick: float) -> None:
+    """Down to a creep of 0.25 m/s, which no margin stops any more."""
+    flight = HoldFlight("ardupilot", "LOITER", ARMING_SKIPCHK=-1.0)
+    flight.trouble = Trouble.CAMERA_LOST
+    flight.fly(20.0)
+    assert flight.asked == []
+    hovered_at_m = flight.controller.vehicle.north_m
+    flight.fly(10.0, stick, until=lambda: flight.controller.mode != "LOITER")
+    assert flight.controller.mode == "BRAKE"
+    assert flight.controller.vehicle.north_m - hovered_at_m < 1.3
+
+    flight.controller.set_mode("LOITER")
+    flight.fly(10.0, stick)
+    assert flight.controller.mode == "LOITER"
+    assert len(flight.asked) == 1
+
+
+def test_a_camera_that_dies_in_flight_stops_the_vehicle_and_a_pilot_who_takes_over_flies() -> None:
     """Real MAVLink over TCP; only the camera and the network are stand-ins."""
-    with FakeAutopilot(flavor, "tcp:127.0.0.1:0", parameters=parameters) as autopilot:
+    with FakeAutopilot("ardupilot", "tcp:127.0.0.1:0", parameters={"PRX_FILT": 0.0}) as autopilot:
         settings = make_settings(f"autopilot.endpoint={autopilot.address}", "autopilot.on_loss=hold")
         camera = ScriptedCamera(settings, MonotonicClock(), [picture()], forever=True)
         service = Service(settings, camera=camera, load_perception=sees_a_wall)
@@ -261,16 +291,16 @@ def test_a_camera_that_dies_in_flight_stops_the_vehicle_and_a_pilot_who_takes_ov
                 pilot.take_off(FLYING_HEIGHT_M)
                 pilot.fly_forward(1.5)
                 wait_until(lambda: autopilot.truth().velocity_ned_mps[0] > 0.8)
-                wait_until(lambda: service.status().mode == flown_in)
+                wait_until(lambda: service.status().mode == "LOITER")
                 camera._acts = [CameraError("unplugged")]
-                wait_until(lambda: autopilot.truth().mode == stopped_in)
+                wait_until(lambda: autopilot.truth().mode == "BRAKE")
                 wait_until(lambda: abs(autopilot.truth().velocity_ned_mps[0]) < 0.2)
                 wait_until(lambda: service.status().link.hold is HoldOutcome.GRANTED)
 
-                pilot.set_mode(flown_in)
+                pilot.set_mode("LOITER")
                 wait_until(lambda: service.status().link.hold is HoldOutcome.OVERRULED)
                 taken_over_s = autopilot.truth().time_s
                 wait_until(lambda: autopilot.truth().time_s > taken_over_s + 1.5)
-                assert autopilot.truth().mode == flown_in
+                assert autopilot.truth().mode == "LOITER"
         finally:
             service.stop()
