@@ -13,6 +13,7 @@ import torch
 from torch import Tensor
 
 from training.data.hint_sampling import HintShares
+from training.data.surface_patterns import AppearanceShares
 from training.errors import CheckpointError
 from training.losses import LossWeights
 from training.networks.depth_network import DepthNetwork, NetworkShape
@@ -154,5 +155,9 @@ def _settings(fields: dict[str, Any]) -> TrainingSettings:
     fields["loss"] = LossWeights(**fields["loss"])
     fields["shape"] = NetworkShape(**fields["shape"])
     fields["hints"] = HintShares(**fields["hints"])
+    # Runs begun before surfaces were changed go on without.
+    fields["appearance"] = AppearanceShares(
+        **fields.get("appearance", {"patterns": 0.0, "filters": 0.0, "photos": 0.0})
+    )
     fields["large"] = None if fields["large"] is None else LargePictures(**fields["large"])
     return TrainingSettings(**fields)

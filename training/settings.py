@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field
 
 from training.data.hint_sampling import HintShares
+from training.data.surface_patterns import AppearanceShares
 from training.errors import TrainingSettingsError
 from training.losses import LossWeights
 from training.networks.depth_network import NetworkShape
@@ -77,6 +78,7 @@ class TrainingSettings:
         seed: of the order of pictures and of random weights.
         precision: "auto", "fp32" or "bf16".
         hints: how often each subset of hints comes.
+        appearance: how often surfaces get another look.
         loss: weights of the terms.
         shape: of the network.
     """
@@ -95,6 +97,7 @@ class TrainingSettings:
     seed: int = 0
     precision: str = "auto"
     hints: HintShares = field(default_factory=HintShares)
+    appearance: AppearanceShares = field(default_factory=AppearanceShares)
     loss: LossWeights = field(default_factory=LossWeights)
     shape: NetworkShape = field(default_factory=NetworkShape)
 

@@ -12,6 +12,7 @@ from training.errors import CheckpointError, TrainingSettingsError
 from training.extras import needs_extra
 
 if TYPE_CHECKING:
+    from training.data.batches import FramePool
     from training.settings import TrainingSettings
     from training.trainer import Trainer
 
@@ -47,13 +48,18 @@ def train(
     seed: Annotated[
         int | None, typer.Option(help="Seed of random weights and of the order of pictures; 0 if not given.")
     ] = None,
+    photos: Annotated[
+        Path | None,
+        typer.Option(help="Folder of photographs (PNG, JPEG) to lay on rendered surfaces now and then."),
+    ] = None,
     precision: Annotated[str, typer.Option(help="auto, fp32 or bf16.")] = "auto",
     threads: Annotated[int | None, typer.Option(min=1, help="Threads; every core if not given.")] = None,
 ) -> None:
     """Train the depth network on rendered flights with exact depth.
 
     A run in minutes plans its learning rates by the clock, one in pictures is repeatable. Frames may be
-    added to the folder while the run goes on. Worlds kept for validation and tests are refused.
+    added to the folder while the run goes on. Worlds kept for validation and tests are refused. To go on
+    exactly, a run with photographs is resumed with the same ones.
     """
     if init is not None and resume:
         raise TrainingSettingsError(f"--init {init} and --resume: a run goes on or starts, not both")
@@ -67,7 +73,7 @@ def train(
     cv2.setNumThreads(1)
     if threads is not None:
         torch.set_num_threads(threads)
-    trainer = _trainer(data, output / CHECKPOINT_NAME, resume, settings)
+    trainer = _trainer(_pool(data, photos), output / CHECKPOINT_NAME, resume, settings)
     if init is not None:
         typer.echo(f"{init}: {trainer.start_from(init)} numbers taken over")
     _run(trainer, output)
@@ -117,19 +123,25 @@ def _settings_maker(
     return make
 
 
-def _trainer(data: Path, checkpoint: Path, resume: bool, settings: SettingsMaker) -> Trainer:
-    from training.checkpoint import Checkpoint
+def _pool(data: Path, photos: Path | None) -> FramePool:
     from training.data.batches import FramePool
+    from training.data.photo_textures import PhotoTextures
+
+    return FramePool(data, photos=None if photos is None else PhotoTextures(photos))
+
+
+def _trainer(pool: FramePool, checkpoint: Path, resume: bool, settings: SettingsMaker) -> Trainer:
+    from training.checkpoint import Checkpoint
     from training.trainer import Trainer
 
     if resume:
         state = Checkpoint.load(checkpoint)
-        return Trainer.resume(state, FramePool(data), settings(state.settings))
+        return Trainer.resume(state, pool, settings(state.settings))
     if checkpoint.exists():
         raise TrainingSettingsError(
             f"{checkpoint} is there already: --resume goes on with it, --output names another folder"
         )
-    return Trainer(settings(None), FramePool(data))
+    return Trainer(settings(None), pool)
 
 
 def _try_to_save(trainer: Trainer, path: Path) -> None:

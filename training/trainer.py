@@ -57,7 +57,7 @@ class Trainer:
         self.images = 0
         self.trained_s = 0.0
         self._pool = pool
-        self._source = BatchSource(pool, settings.seed, _BATCHES_AHEAD, settings.hints)
+        self._source = BatchSource(pool, settings.seed, _BATCHES_AHEAD, settings.hints, settings.appearance)
         self._seconds = seconds
         self._precision = resolve_precision(settings.precision)
         torch.manual_seed(settings.seed)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from torch import nn
 from training.averaging import AverageWeights
 from training.checkpoint import Checkpoint
 from training.data.batches import FramePool
+from training.data.surface_patterns import AppearanceShares
 from training.run_log import RunLog, RunSummary, read_log
 from training.settings import TrainingSettings
 from training.trainer import Trainer
@@ -41,8 +43,18 @@ def test_a_resumed_run_continues_exactly(pool: FramePool, tmp_path: Path) -> Non
         assert torch.equal(value, resumed.checkpoint().average[name]), name
 
 
+def test_a_run_from_before_surfaces_were_changed_goes_on_without(pool: FramePool, tmp_path: Path) -> None:
+    path = tmp_path / "checkpoint.pt"
+    Trainer(settings(), pool, pretrained=False).save(path)
+    content = torch.load(path, weights_only=True)
+    del content["settings"]["appearance"]
+    torch.save(content, path)
+    assert Checkpoint.load(path).settings.appearance == AppearanceShares(0.0, 0.0, 0.0)
+
+
 def test_training_learns_the_painted_ground(pool: FramePool) -> None:
-    trainer = Trainer(settings(images=40), pool, pretrained=False)
+    as_painted = replace(settings(images=80), appearance=AppearanceShares(0.0, 0.0))
+    trainer = Trainer(as_painted, pool, pretrained=False)
     losses = run_to_end(trainer)
     assert sum(losses[-5:]) < 0.9 * sum(losses[:5])
 

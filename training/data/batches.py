@@ -16,7 +16,9 @@ from training.data.augmentation import change_light, cut_depth, cut_image, sampl
 from training.data.camera_effects import camera_effects
 from training.data.frame_store import FrameRecord, FrameStore
 from training.data.hint_sampling import HintShares, hint_maps, sample_hints
+from training.data.photo_textures import PhotoTextures
 from training.data.seed_split import SeedSplit
+from training.data.surface_patterns import AppearanceShares, change_surfaces
 from training.data.views import View, view_of_crop
 from training.errors import TrainingDataError
 from training.normalization import IMAGE_MEAN, IMAGE_STD, MAX_DEPTH_M, log_inverse_depth
@@ -51,9 +53,21 @@ class Batch:
 
 
 class FramePool:
-    """The frames of a store that are for learning, by scene. It grows while a renderer fills the store."""
+    """The frames of a store that are for learning, by scene. It grows while a renderer fills the store.
 
-    def __init__(self, root: Path, shares: Mapping[str, float] = SCENE_SHARES) -> None:
+    Args:
+        root: folder of the store.
+        shares: how often frames of each scene come.
+        photos: to lay on the frames' surfaces; None for none.
+
+    Raises:
+        TrainingDataError: no store, none complete, or a seed kept for tests.
+    """
+
+    def __init__(
+        self, root: Path, shares: Mapping[str, float] = SCENE_SHARES, photos: PhotoTextures | None = None
+    ) -> None:
+        self.photos = photos
         self._store = FrameStore(root)
         self._shares = shares
         self._by_scene: dict[str, list[FrameRecord]] = {}
@@ -95,6 +109,8 @@ def make_batch(
     width: int,
     height: int,
     shares: HintShares | None = None,
+    appearance: AppearanceShares | None = None,
+    photos: PhotoTextures | None = None,
 ) -> Batch:
     """Augmented batch of the given frames at the network's size.
 
@@ -103,9 +119,11 @@ def make_batch(
         rng: random numbers.
         width, height: the network's size.
         shares: how often each subset of hints comes; None takes the usual ones.
+        appearance: how often surfaces get another look; None takes the usual shares.
+        photos: to lay on surfaces; None for none.
     """
-    shares = shares or HintShares()
-    items = [_make_item(record, rng, width, height, shares) for record in records]
+    shares, appearance = shares or HintShares(), appearance or AppearanceShares()
+    items = [_make_item(record, rng, width, height, shares, appearance, photos) for record in records]
     images, depths, grounds, points, focals = (list(column) for column in zip(*items, strict=True))
     targets = [log_inverse_depth(depth, focal) for depth, focal in zip(depths, focals, strict=True)]
     return Batch(
@@ -122,14 +140,21 @@ _Array = NDArray[np.float32]
 
 
 def _make_item(
-    record: FrameRecord, rng: np.random.Generator, width: int, height: int, shares: HintShares
+    record: FrameRecord,
+    rng: np.random.Generator,
+    width: int,
+    height: int,
+    shares: HintShares,
+    appearance: AppearanceShares,
+    photos: PhotoTextures | None,
 ) -> tuple[_Array, _Array, _Array, _Array, float]:
     """Picture, depth, ground, points and focal length of one frame, augmented."""
     crop = sample_crop(rng, record.camera.width, record.camera.height)
     depth_m = cut_depth(record.depth_m(), crop, width, height)
-    picture = camera_effects(rng, cut_image(record.image_bgr(), crop, width, height), depth_m)
-    picture = change_light(rng, picture)
     view = view_of_crop(View(record.camera, record.mount, record.attitude), crop, width, height)
+    picture = cut_image(record.image_bgr(), crop, width, height)
+    picture = change_surfaces(rng, picture, depth_m, view.camera, appearance, photos)
+    picture = change_light(rng, camera_effects(rng, picture, depth_m))
     hints = sample_hints(rng, view, record.height_m, picture, depth_m, shares)
     ground, points = hint_maps(hints, view, width, height)
     return network_image(picture), depth_m, ground, points, view.camera.fx
@@ -155,9 +180,17 @@ class BatchRequest:
 class BatchSource:
     """Makes batches ahead of the training step on a thread of its own (OpenCV and NumPy release the lock)."""
 
-    def __init__(self, pool: FramePool, seed: int, ahead: int = 2, shares: HintShares | None = None) -> None:
+    def __init__(
+        self,
+        pool: FramePool,
+        seed: int,
+        ahead: int = 2,
+        shares: HintShares | None = None,
+        appearance: AppearanceShares | None = None,
+    ) -> None:
         self._pool = pool
         self._shares = shares
+        self._appearance = appearance
         self._seed = seed
         self._ahead = ahead
 
@@ -165,7 +198,8 @@ class BatchSource:
         """The batch of that number; the same number over the same pool gives the same batch."""
         rng = np.random.default_rng([self._seed, request.number])
         records = self._pool.draw(rng, request.count)
-        return make_batch(records, rng, request.width, request.height, self._shares)
+        size = request.width, request.height
+        return make_batch(records, rng, *size, self._shares, self._appearance, self._pool.photos)
 
     def stream(self, requests: Iterator[BatchRequest]) -> Iterator[Batch]:
         """Batches in the order of `requests`, the next few already being made."""
