@@ -46,16 +46,10 @@ def viewer_endpoints(
     Raises:
         ConfigError: an endpoint, a file or a certificate that cannot be used.
     """
-    from service.errors import ConfigError
     from service.security.options import load_zenoh_settings
-    from service.settings.zenoh import check_endpoint
 
-    for option, endpoints in (("--connect", connect), ("--listen", listen)):
-        for endpoint in endpoints:
-            try:
-                check_endpoint(endpoint)
-            except ValueError as error:
-                raise ConfigError(f"{option}: {error}") from error
+    check_endpoints("--connect", connect)
+    check_endpoints("--listen", listen)
     security = None
     if config is not None:
         settings = load_zenoh_settings(config)
@@ -67,3 +61,19 @@ def viewer_endpoints(
     if not connect and not listen:
         connect = (DEFAULT_CONNECT,)
     return ViewerEndpoints(tuple(connect), tuple(listen), security)
+
+
+def check_endpoints(option: str, endpoints: Sequence[str]) -> None:
+    """Look at endpoints of the command line.
+
+    Raises:
+        ConfigError: one that is none; the text names the option.
+    """
+    from service.errors import ConfigError
+    from service.settings.zenoh import check_endpoint
+
+    for endpoint in endpoints:
+        try:
+            check_endpoint(endpoint)
+        except ValueError as error:
+            raise ConfigError(f"{option}: {error}") from error

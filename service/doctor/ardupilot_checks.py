@@ -5,6 +5,7 @@ from __future__ import annotations
 from service.doctor.finding import Finding, Level
 from service.doctor.judge import judge, number
 from service.doctor.observation import ARDUPILOT, Observation, Plan
+from service.latency_advice import advise
 
 PROXIMITY_MAVLINK = 2
 USE_PROXIMITY_BIT = 2
@@ -12,6 +13,8 @@ DOWNWARD = 25
 LEAST_FILTER_HZ = 5.0
 LEAST_MARGIN_M = 2.0
 WPNAV_BIT = 64
+_ROUNDING = 1e-3
+"""Parameters travel in single precision: 2.6 comes back as 2.5999999."""
 
 
 def check_ardupilot(seen: Observation, plan: Plan) -> list[Finding]:
@@ -118,7 +121,6 @@ def _filter(seen: Observation) -> list[Finding]:
 
 def _avoidance(seen: Observation, plan: Plan) -> list[Finding]:
     enabled = int(_get(seen, "AVOID_ENABLE"))
-    margin_m = _get(seen, "AVOID_MARGIN")
     findings = judge(
         seen,
         "AVOID_ENABLE",
@@ -129,19 +131,7 @@ def _avoidance(seen: Observation, plan: Plan) -> list[Finding]:
         "set AVOID_ENABLE to 3 or 7",
         f"{enabled}: avoidance uses proximity",
     )
-    if margin_m >= plan.range_m:
-        level, text = Level.FAILURE, f"the margin is not inside the range of {plan.range_m:g} m"
-    else:
-        level, text = Level.WARNING, "metres of margin are few: the copter may overshoot"
-    findings += judge(
-        seen,
-        "AVOID_MARGIN",
-        LEAST_MARGIN_M <= margin_m < plan.range_m,
-        level,
-        text,
-        LEAST_MARGIN_M,
-        "set AVOID_MARGIN to 2 to 3",
-    )
+    findings += _margin(seen, plan)
     findings += judge(
         seen,
         "AVOID_BEHAVE",
@@ -161,6 +151,30 @@ def _avoidance(seen: Observation, plan: Plan) -> list[Finding]:
         fine_text=f"ALT_HOLD leans away from what is nearer than {number(reach_m)} m",
     )
     return findings
+
+
+def _margin(seen: Observation, plan: Plan) -> list[Finding]:
+    margin_m, latency_s = _get(seen, "AVOID_MARGIN"), plan.latency_s or 0.0
+    wanted_m = max(LEAST_MARGIN_M, advise(1000.0 * latency_s, plan.range_m).margin_m)
+    if margin_m >= plan.range_m:
+        level, text = Level.FAILURE, f"the margin is not inside the range of {plan.range_m:g} m"
+    elif margin_m < LEAST_MARGIN_M:
+        level, text = Level.WARNING, "metres of margin are few: the copter may overshoot"
+    else:
+        level = Level.NOTE
+        text = (
+            f"what comes into view within the latency of {latency_s:.3g} s takes up to "
+            f"{wanted_m - LEAST_MARGIN_M:.1f} m of it, at the greatest speed from which the copter can stop"
+        )
+    return judge(
+        seen,
+        "AVOID_MARGIN",
+        wanted_m - _ROUNDING <= margin_m < plan.range_m,
+        level,
+        text,
+        wanted_m,
+        f"set AVOID_MARGIN to {number(wanted_m)} to {number(max(wanted_m, 3.0))}",
+    )
 
 
 def _path_planning(seen: Observation, plan: Plan) -> list[Finding]:

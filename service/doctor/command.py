@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import signal
 import threading
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from service.options import AutopilotOption, ConfigOption, OverridesOption
+from service.viewer_endpoints import check_endpoints
 
 if TYPE_CHECKING:
     from service.doctor.finding import Finding
@@ -31,7 +33,17 @@ def doctor(
             "--latency",
             min=0.0,
             max=5.0,
-            help="Measured capture-to-wire latency, seconds (`uavdepth watch`).",
+            help="Capture-to-wire latency, seconds, in place of the one that a running service measures.",
+        ),
+    ] = None,
+    live: Annotated[
+        bool, typer.Option(help="Ask a running `uavdepth run` over Zenoh for the latency that it measures.")
+    ] = True,
+    connect: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Zenoh endpoint of that service or a router, in place of the configured ones; may be given "
+            "many times."
         ),
     ] = None,
     range_m: Annotated[
@@ -55,7 +67,8 @@ def doctor(
 ) -> None:
     """Say why obstacles would not show or not stop the vehicle, each with the fix.
 
-    It listens to the autopilot, asks for message rates as `run` does, and reads parameters. Exit codes: 0 no
+    It listens to the autopilot, asks for message rates as `run` does, and reads parameters; where a service
+    runs for this vehicle, it takes the measured latency from its status. Exit codes: 0 no
     failure (there may be warnings), 1 a failure, 2 a wrong configuration or command line.
     """
     from service.autopilot.signing_key import load_signing_key
@@ -64,6 +77,7 @@ def doctor(
     from service.doctor.examination import Examination, plan_of
     from service.doctor.finding import has_failure
     from service.doctor.listen import listen
+    from service.doctor.live_latency import KnownLatency, ServiceEar, service_endpoints
     from service.doctor.report import report_json, report_table
     from service.errors import ConfigError
     from service.settings.load import load_settings
@@ -81,6 +95,11 @@ def doctor(
     key_file = settings.autopilot.signing_key_file
     key = load_signing_key(Path(key_file).expanduser()) if key_file else None
     plan = plan_of(settings.autopilot, scan.min_distance_m, trusted_m, latency_s, signs=key is not None)
+    check_endpoints("--connect", connect or [])
+    clock = MonotonicClock()
+    places = connect or service_endpoints(settings.zenoh)
+    name = settings.vehicle.name if "name" in settings.vehicle.model_fields_set else None
+    ear = ServiceEar(places if live and latency_s is None else (), settings.zenoh.security, name, clock)
 
     stop = threading.Event()
     before = {
@@ -89,14 +108,19 @@ def doctor(
     }
     examination = Examination(settings.autopilot, plan, scan.max_distance_m, key, probe)
     try:
-        seen = listen(examination, settings.autopilot.endpoint, seconds, MonotonicClock(), stop)
+        with ear:
+            seen = listen(examination, settings.autopilot.endpoint, seconds, clock, stop)
+            known = KnownLatency(latency_s, "given with --latency" if latency_s is not None else "--no-live")
+            if live and latency_s is None:
+                known = ear.latency(seen.system_id, stop)
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+    plan = replace(plan, latency_s=known.seconds, latency_source=known.source)
     findings = examine(seen, plan)
 
     if as_json:
-        typer.echo(report_json(findings, seen))
+        typer.echo(report_json(findings, seen, plan))
     else:
         from rich.console import Console
 

@@ -112,7 +112,7 @@ def check_speed(seen: Observation, plan: Plan) -> list[Finding]:
         f"1 m/s2 and reacts within {reaction_time_s:.2f} s can stop from {speed:.1f} m/s"
     )
     if plan.latency_s is None:
-        text += " (latency not counted: give --latency)"
+        text += " (latency not counted)"
     if is_px4:
         text += "; an estimate, PX4 was measured to 6.5 m/s only"
     limit = seen.parameters.get(limit_name)

@@ -165,3 +165,15 @@ def _how_to_be_heard(endpoint: str) -> str:
     if isinstance(place, UdpListenEndpoint):
         return f"let the autopilot or router send to this computer's port {place.port}"
     return "check that the other end is an autopilot or a MAVLink router, and that it is running"
+
+
+def check_latency(seen: Observation, plan: Plan) -> list[Finding]:
+    """The latency that the other checks count with, and where it comes from (R9)."""
+    if seen.autopilot is None:
+        return []
+    if plan.latency_s is not None:
+        text = f"{plan.latency_s:.3g} s from capture to the line, {plan.latency_source}"
+        return [Finding(Level.OK, "latency", text)]
+    text = f"not known: {plan.latency_source}; what follows counts with none"
+    fix = "start `uavdepth run` and name its Zenoh endpoint with --connect, or give --latency"
+    return [Finding(Level.NOTE, "latency", text, fix)]

@@ -61,7 +61,7 @@ def _delay(seen: Observation, plan: Plan) -> list[Finding]:
     value = seen.parameters["CP_DELAY"]
     if plan.latency_s is None:
         text = f"is {number(value)} s; right is the measured latency and 0.2 to 0.4 s"
-        fix = "read the latency in `uavdepth watch` and give it to the doctor with --latency"
+        fix = "run the doctor beside `uavdepth run`, or give the latency of `uavdepth watch` with --latency"
         return [Finding(Level.NOTE, "CP_DELAY", text, fix, "CP_DELAY", value)]
     low, best, high = (plan.latency_s + extra for extra in DELAY_EXTRA_S)
     level = Level.WARNING if value < low else Level.NOTE

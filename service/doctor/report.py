@@ -12,13 +12,15 @@ from rich.table import Table
 from rich.text import Text
 
 from service.doctor.finding import Finding, Level, has_failure
-from service.doctor.observation import Observation
+from service.doctor.observation import Observation, Plan
 
 _STYLES = {Level.OK: "green", Level.NOTE: "cyan", Level.WARNING: "yellow", Level.FAILURE: "bold red"}
 
 
-def report_json(findings: Sequence[Finding], seen: Observation) -> str:
-    """One JSON object: endpoint, autopilot, version, system_id, mode, armed, ok (no failure), findings."""
+def report_json(findings: Sequence[Finding], seen: Observation, plan: Plan) -> str:
+    """One JSON object: endpoint, autopilot, version, system_id, mode, armed, latency_s (counted with, or
+    null), ok (no failure), findings.
+    """
     return json.dumps(
         {
             "endpoint": seen.endpoint,
@@ -27,6 +29,7 @@ def report_json(findings: Sequence[Finding], seen: Observation) -> str:
             "system_id": seen.system_id,
             "mode": seen.mode,
             "armed": seen.armed,
+            "latency_s": plan.latency_s,
             "ok": not has_failure(findings),
             "findings": [asdict(finding) for finding in findings],
         }

@@ -23,8 +23,8 @@ def active_lines(text: str) -> list[str]:
 
 def test_ardupilots_file_changes_what_is_wrong_and_nothing_else() -> None:
     text = file_of(Bench(PRX1_TYPE=0, AVOID_ENABLE=4, PRX_FILT=0.25))
-    assert active_lines(text) == ["PRX1_TYPE,2", "PRX_FILT,0", "AVOID_ENABLE,7"]
-    assert "# AVOID_MARGIN is 2 already" in text
+    assert active_lines(text) == ["PRX1_TYPE,2", "PRX_FILT,0", "AVOID_ENABLE,7", "AVOID_MARGIN,2.6"]
+    assert "# AVOID_BEHAVE is 1 already" in text
     assert "1.16 m instead of 2.15 m" in text  # the reason stands beside the value
 
 

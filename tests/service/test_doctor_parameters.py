@@ -46,8 +46,10 @@ ARDUPILOT_RULES: list[tuple[str, float, Level, float | None]] = [
     ("AVOID_ENABLE", 1, Level.FAILURE, 3),
     ("AVOID_ENABLE", 5, Level.FAILURE, 7),
     ("AVOID_ENABLE", 3, Level.OK, 3),
-    ("AVOID_MARGIN", 0.5, Level.WARNING, 2),
-    ("AVOID_MARGIN", 20.0, Level.FAILURE, 2),
+    ("AVOID_MARGIN", 0.5, Level.WARNING, 2.6),
+    ("AVOID_MARGIN", 2.0, Level.NOTE, 2.6),  # fine but for the latency of 0.1 s
+    ("AVOID_MARGIN", 2.7, Level.OK, 2.7),
+    ("AVOID_MARGIN", 20.0, Level.FAILURE, 2.6),
     ("AVOID_BEHAVE", 0, Level.NOTE, 1),
     ("AVOID_DIST_MAX", 0, Level.NOTE, 5),
     ("OA_TYPE", 0, Level.NOTE, None),
@@ -117,3 +119,7 @@ def test_without_a_latency_the_delay_is_a_note_that_says_where_to_read_it() -> N
     finding = about("CP_DELAY", PX4, replace(PLAN, latency_s=None))
     assert (finding.level, finding.recommended) == (Level.NOTE, None)
     assert "uavdepth watch" in finding.fix
+
+
+def test_without_a_latency_two_metres_of_margin_are_enough() -> None:
+    assert about("AVOID_MARGIN", COPTER, replace(PLAN, latency_s=None)).level is Level.OK

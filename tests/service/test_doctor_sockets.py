@@ -20,7 +20,7 @@ ANY_TCP = "tcp:127.0.0.1:0"
 
 
 def run(endpoint: str, *arguments: str, seconds: float = 1.5) -> Result:
-    return run_bare("--autopilot", endpoint, "--seconds", str(seconds), *arguments)
+    return run_bare("--autopilot", endpoint, "--seconds", str(seconds), "--no-live", *arguments)
 
 
 def run_bare(*arguments: str) -> Result:
