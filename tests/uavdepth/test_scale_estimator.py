@@ -8,9 +8,19 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from solids import box, depth_of, ground, slope, wall
+from solids import Solid, box, depth_of, ground, slope, smooth_noise, wall
 
-from uavdepth import Attitude, CameraModel, CameraMount, DepthMap, GroundHint, ImageSizeError, PointHints
+from uavdepth import (
+    Attitude,
+    CameraModel,
+    CameraMount,
+    DepthMap,
+    GroundHint,
+    GroundScaler,
+    ImageSizeError,
+    PointHints,
+)
+from uavdepth.scale.affine_fit import AffineFit
 from uavdepth.scale.estimator import ScaleEstimate, ScaleEstimator, apply
 
 CAMERA = CameraModel.from_fov(320, 160, 90)
@@ -118,6 +128,18 @@ def test_farther_than_the_points_an_affine_network_s_metres_are_less_sure(rng: n
     assert metres.relative_sigma[0, 1] > 1.5 * metres.relative_sigma[0, 0]
 
 
+def test_the_scale_makes_up_for_a_shape_that_moves(rng: np.random.Generator) -> None:
+    fit, values = AffineFit(CAMERA, MOUNT, GroundScaler(CAMERA, MOUNT)), affine().affine_inverse_depth
+    assert values is not None
+    fit.update(values, None, points_on(STREET, rng), 0.1)
+    before_m = fit.depth_m(values)
+    made_up = fit.update(values, None, points_on(STREET, rng, wrong=1.3), 2.0)
+    after_m = fit.depth_m(values)
+    known = STREET < 15
+    assert np.median(after_m[known] / before_m[known]) > 1.1
+    assert np.median(np.exp(made_up) * after_m[known] / before_m[known]) == pytest.approx(1.0, abs=0.03)
+
+
 def test_points_at_one_depth_do_not_tell_scale_and_shift(rng: np.random.Generator) -> None:
     flat = np.full_like(STREET, 9.0)
     found = flown(ScaleEstimator(CAMERA, MOUNT, "affine"), affine(flat), None, lambda: points_on(flat, rng))
@@ -213,6 +235,28 @@ def test_a_roof_below_without_points_makes_the_scale_doubtful() -> None:
         if (found := estimator.update(relative(), roof, None, number * STEP_NS)) is not None
     ]
     assert max(sigmas) > 0.25
+
+
+TREETOPS = [box((3 + 2.2 * row, -60, 3 - 0.9 * row), (5 + 2.2 * row, 60, 40)) for row in range(8)]
+ROOF = [box((4, -40, 2.5), (11, 40, 14)), ground(14)]
+BANK = [slope(6, 25, 5)]
+
+
+@pytest.mark.parametrize(
+    ("network", "seen"),
+    [(relative, TREETOPS), (affine, TREETOPS), (relative, ROOF), (affine, BANK)],
+    ids=["treetops, relative", "treetops, affine", "roof, relative", "bank, affine"],
+)
+def test_what_is_not_the_measured_ground_is_not_surely_taken_for_it(
+    network: Callable[[NDArray[np.float32]], DepthMap], seen: list[Solid], rng: np.random.Generator
+) -> None:
+    truth_m = depth_of(seen, CAMERA, MOUNT, LEVEL)
+    estimator = ScaleEstimator(CAMERA, MOUNT, "affine" if network is affine else "relative")
+    for number in range(4):
+        depth = network(truth_m * smooth_noise(rng, truth_m.shape, 0.1))
+        found = estimator.update(depth, GroundHint(MOUNT, LEVEL, 6.0), None, number * STEP_NS)
+        is_sure = found is not None and found.relative_sigma <= 0.25
+        assert not is_sure, f"it claims {found}, and is off by {off(found, depth, truth_m):.2f}"
 
 
 def test_points_overrule_a_ground_that_was_wrong_from_the_start(rng: np.random.Generator) -> None:

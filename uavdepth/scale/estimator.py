@@ -1,8 +1,8 @@
 """Metres for a network that has none, or that is not to be trusted with them.
 
 Two sources: points measured by the vehicle's own motion, and the ground at a known height. What a reading
-is: `scale_points` and `ground_scale`; how readings become one scale: `scale_filter`; how inverse depth up to
-scale and shift gets both: `scale_shape`.
+is: `points` and `ground_scale`; how readings become one scale: `filter`; how inverse depth up to scale and
+shift gets both: `affine_fit`.
 """
 
 from __future__ import annotations
@@ -12,17 +12,17 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from uavdepth.camera import CameraModel, CameraMount
 from uavdepth.depth.depth_map import DepthMap
 from uavdepth.errors import ImageSizeError
 from uavdepth.model.hints import GroundHint, PointHints
+from uavdepth.scale.affine_fit import AffineFit
 from uavdepth.scale.filter import GROUND, POINTS, ScaleFilter, ScaleReading
-from uavdepth.scale.ground_scale import MAX_PLANE_DEPTH_M, MIN_DEPRESSION, MIN_HEIGHT_M, GroundScaler
+from uavdepth.scale.ground_scale import GroundScale, GroundScaler
 from uavdepth.scale.points import LEAST_POINTS, PointScale, sample, scale_from_points
-from uavdepth.scale.shape import AffineSamples, AffineShape, fit_affine
 from uavdepth.scale.suspicion import Disagreement
-from uavdepth.scan.body_rays import body_rays
 
 NetworkKind = Literal["relative", "affine", "metric"]
 
@@ -40,8 +40,6 @@ attitude, the rangefinder over grass."""
 _FRESH_SHARE = 0.4
 """Of the points' error by regions, what is another one in the next picture."""
 
-_GROUND_COLUMNS = 32
-_GROUND_SIGMA = 0.1
 _RECENT_S = 0.3
 
 
@@ -109,8 +107,7 @@ class ScaleEstimator:
         self._plausible = METRIC_FACTORS if kind == "metric" else None
         self._scaler = GroundScaler(camera, mount, self._plausible)
         self._filter = ScaleFilter(WANDER_PER_SQRT_S)
-        self._stride = max(1, round(camera.width / _GROUND_COLUMNS))
-        self._rays = body_rays(camera, mount, self._stride).reshape(3, -1)
+        self._fit = AffineFit(camera, mount, self._scaler)
         self._disagreement = Disagreement()
         self.clear()
 
@@ -118,7 +115,7 @@ class ScaleEstimator:
         """Forget everything: the camera or the network was changed, or time went back."""
         self._filter.clear()
         self._disagreement.clear()
-        self._shape: AffineShape | None = None
+        self._fit.clear()
         self._scatter = 0.0
         self._region_sigma = 0.0
         self._at_ns: int | None = None
@@ -151,22 +148,35 @@ class ScaleEstimator:
             passed_s = 0.0
         self._at_ns = captured_ns
         self._filter.predict(passed_s)
-        if self.kind == "affine":
-            self._reshape(depth, ground, points, passed_s)
-            if self._shape is None:
-                return None
-            depth = depth.fitted(self._shape.scale, self._shape.shift)
-        self._listen(depth, ground, points, passed_s)
+        if self.kind != "affine":
+            by_ground = None
+            if ground is not None:
+                by_ground = self._scaler.estimate(depth.depth_m, ground.attitude, ground.height_m)
+            self._listen(depth.depth_m, by_ground, points, passed_s)
+            return self._estimate()
+        values = depth.affine_inverse_depth
+        if values is None:
+            raise ValueError("an affine network's depth map has affine_inverse_depth; this one has none")
+        # The filter's log factor is against the fit, so it moves with it.
+        self._filter.shift(self._fit.update(values, ground, points, passed_s))
+        if self._fit.shape is None:
+            return None
+        by_ground = None if ground is None else self._fit.ground_scale(values, ground)
+        self._listen(self._fit.depth_m(values), by_ground, points, passed_s)
         return self._estimate()
 
     def _listen(
-        self, depth: DepthMap, ground: GroundHint | None, points: PointHints | None, passed_s: float
+        self,
+        depth_m: NDArray[np.float32],
+        by_ground: GroundScale | None,
+        points: PointHints | None,
+        passed_s: float,
     ) -> None:
         """What both sources say of depth in the network's (or the fit's) unit."""
         readings = []
         by_points = None
         if points is not None and len(points) >= LEAST_POINTS:
-            by_points = self._plausible_points(scale_from_points(sample(depth.depth_m, points, self.camera)))
+            by_points = self._plausible_points(scale_from_points(sample(depth_m, points, self.camera)))
         if by_points is not None:
             readings.append(
                 ScaleReading(
@@ -179,9 +189,6 @@ class ScaleEstimator:
             share = 1.0 - math.exp(-passed_s) if self._scatter else 1.0
             self._scatter += share * (by_points.scatter - self._scatter)
             self._region_sigma += share * (by_points.region_sigma - self._region_sigma)
-        by_ground = None
-        if ground is not None:
-            by_ground = self._scaler.estimate(depth.depth_m, ground.attitude, ground.height_m)
         if by_ground is not None:
             lasting = math.hypot(by_ground.relative_sigma, _GROUND_DOUBT)
             readings.append(ScaleReading(GROUND, math.log(by_ground.factor), lasting, 0.02))
@@ -197,44 +204,6 @@ class ScaleEstimator:
         low, high = self._plausible
         return found if low <= math.exp(found.log_factor) <= high else None
 
-    def _reshape(
-        self, depth: DepthMap, ground: GroundHint | None, points: PointHints | None, passed_s: float
-    ) -> None:
-        """Fit scale and shift anew; the filter's log factor is against the fit, so it moves with it."""
-        values = depth.affine_inverse_depth
-        if values is None:
-            raise ValueError("an affine network's depth map has affine_inverse_depth; this one has none")
-        nothing = np.empty(0)
-        samples = AffineSamples(nothing, nothing, nothing, nothing)
-        if points is not None and len(points) >= LEAST_POINTS:
-            found = sample(values, points, self.camera, inverse=True)
-            worth = 1.0 / np.maximum(np.bincount(found.tile)[found.tile], 4.0) * 4.0
-            samples = samples.with_more(AffineSamples(found.network, 1.0 / found.depth_m, found.sigma, worth))
-        if ground is not None:
-            samples = samples.with_more(self._ground_samples(values, ground))
-        before = self._shape
-        self._shape = fit_affine(samples, before, passed_s)
-        if before is not None and self._shape is not None:
-            held = before.inverse_m(self._shape.network(self._shape.pivot))
-            if held > 0:
-                self._filter.shift(math.log(self._shape.pivot / held))
-
-    def _ground_samples(self, values: np.ndarray, ground: GroundHint) -> AffineSamples:
-        """The level ground's inverse depth at a grid of pixels that look down."""
-        start = self._stride // 2
-        network = values[start :: self._stride, start :: self._stride].ravel().astype(np.float64)
-        down = ground.attitude.level_from_body[2] @ self._rays
-        height_m = ground.camera_height_m
-        looks = (down > MIN_DEPRESSION * np.linalg.norm(self._rays, axis=0)) & np.isfinite(network)
-        if height_m < MIN_HEIGHT_M:
-            looks[:] = False
-        inverse = down[looks] / max(height_m, MIN_HEIGHT_M)
-        near_enough = inverse > 1.0 / MAX_PLANE_DEPTH_M
-        inverse, network = inverse[near_enough], network[looks][near_enough]
-        # All of the ground is worth as much as forty points in tiles of their own.
-        worth = np.full(len(network), min(1.0, 40.0 / max(len(network), 1)))
-        return AffineSamples(network, inverse, np.full(len(network), _GROUND_SIGMA), worth)
-
     def _estimate(self) -> ScaleEstimate | None:
         held = self._filter
         if not held.known or held.age_s() > self.hold_s:
@@ -243,9 +212,10 @@ class ScaleEstimator:
         # Errors of regions come in every reading anew, but not by chance: they do not average out.
         sigma = math.hypot(held.sigma, self._region_sigma)
         scale, shift, covariance = math.exp(-held.log_factor), 0.0, (0.0, 0.0, 0.0)
-        if self._shape is not None:
-            theta = scale * np.array([self._shape.scale, self._shape.shift])
-            whole = scale**2 * self._shape.relative() + sigma**2 * np.outer(theta, theta)
+        shape = self._fit.shape
+        if shape is not None:
+            theta = scale * np.array([shape.scale, shape.shift])
+            whole = scale**2 * shape.relative() + sigma**2 * np.outer(theta, theta)
             covariance = float(whole[0, 0]), float(whole[0, 1]), float(whole[1, 1])
             scale, shift = float(theta[0]), float(theta[1])
         return ScaleEstimate(
