@@ -173,7 +173,6 @@ def _margin(seen: Observation, plan: Plan) -> list[Finding]:
         level,
         text,
         wanted_m,
-        f"set AVOID_MARGIN to {number(wanted_m)} to {number(max(wanted_m, 3.0))}",
     )
 
 
