@@ -109,6 +109,7 @@ class LiveHints:
     def _add(self, at_ns: int, telemetry: Telemetry) -> None:
         if telemetry.at_ns != at_ns:
             return
+        telemetry = telemetry.steady
         attitude = telemetry.attitude
         is_new = self._attitude_ns is None or at_ns > self._attitude_ns
         if attitude is not None and is_new and self._motion.add_attitude(at_ns, attitude):

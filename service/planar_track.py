@@ -1,4 +1,5 @@
-"""The vehicle's way seen from above, by its velocity: what resets of the autopilot's position leave alone."""
+"""The vehicle's way seen from above, by its velocity: resets of the autopilot's position and heading leave it
+alone."""
 
 from __future__ import annotations
 
@@ -18,8 +19,9 @@ _VELOCITY_NOISE_MPS = 1.0
 class PlanarTrack:
     """Carries a pose along with the velocity. One thread; reads no clock.
 
-    An estimator that finds its position wrong moves it by decimetres or metres at once, and the vehicle with
-    everything that it has seen would jump. Over half a second the velocity tells the way to centimetres.
+    An estimator that finds its position wrong moves it by decimetres or metres at once, one that finds its
+    heading wrong turns it by degrees, and the vehicle with everything that it has seen would jump. Over half
+    a second the velocity tells the way to centimetres, and the nose turns as the body rates say.
     """
 
     def __init__(self) -> None:
@@ -32,6 +34,7 @@ class PlanarTrack:
         Returns:
             None where the way since the last call is not known: nothing seen before has a place any more.
         """
+        telemetry = telemetry.steady
         last, self._last = self._last, telemetry
         attitude, velocity = telemetry.attitude, telemetry.velocity_ned_mps
         if attitude is None or velocity is None or not _are_finite(*velocity, attitude.yaw_rad):

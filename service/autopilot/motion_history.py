@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from service.autopilot.heading_reset import heading_reset
 from service.autopilot.history import History, Value
-from service.autopilot.quaternion import Quaternion, from_attitude, slerp, to_attitude, turned
+from service.autopilot.quaternion import Quaternion, from_attitude, headed, slerp, to_attitude, turned
 from service.settings.autopilot import AutopilotSettings
 from uavdepth.attitude import Attitude
 
@@ -48,6 +49,7 @@ class MotionLimits:
 class _Turning:
     quaternion: Quaternion
     body_rates_rps: Vector
+    heading_shift_rad: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -76,8 +78,26 @@ class MotionHistory:
         angles = (attitude.roll_rad, attitude.pitch_rad, attitude.yaw_rad)
         if not all(math.isfinite(value) for value in (*angles, *body_rates_rps)):
             return False
-        self._attitudes.add(boot_ns, _Turning(from_attitude(attitude), body_rates_rps))
+        new = _Turning(from_attitude(attitude), body_rates_rps)
+        shift_rad = self._heading_shift(boot_ns, new)
+        self._attitudes.add(boot_ns, replace(new, heading_shift_rad=shift_rad))
         return True
+
+    def _heading_shift(self, boot_ns: int, new: _Turning) -> float:
+        """How far resets have turned the heading by this message, which may come late."""
+        before, after = self._attitudes.around(boot_ns)
+        if before is None or before[0] == boot_ns:
+            return 0.0 if after is None else after[1].heading_shift_rad
+        reset_rad = heading_reset(
+            before[1].quaternion,
+            before[1].body_rates_rps,
+            new.quaternion,
+            new.body_rates_rps,
+            (boot_ns - before[0]) * 1e-9,
+        )
+        if reset_rad and after is not None:
+            return after[1].heading_shift_rad
+        return before[1].heading_shift_rad + reset_rad
 
     def add_position(self, boot_ns: int, position_ned_m: Vector, velocity_ned_mps: Vector) -> bool:
         """Add a LOCAL_POSITION_NED; False (and nothing added) if a number is not finite."""
@@ -101,15 +121,31 @@ class MotionHistory:
         Args:
             carried_ns: furthest that a message is carried by its rates, instead of the limit.
         """
+        turning = self._turning_at(boot_ns, carried_ns)
+        return None if turning is None else to_attitude(turning[0])
+
+    def heading_shift_at(self, boot_ns: int, carried_ns: int | None = None) -> float:
+        """How far resets have turned the heading of `attitude_at` since the first message, radians clockwise;
+        0 where that is None."""
+        turning = self._turning_at(boot_ns, carried_ns)
+        return 0.0 if turning is None else turning[1]
+
+    def _turning_at(self, boot_ns: int, carried_ns: int | None) -> tuple[Quaternion, float] | None:
+        """Attitude, and how far resets have turned its heading."""
         before, after = self._attitudes.around(boot_ns)
         if before and after and after[0] - before[0] <= self._limits.gap_ns:
             fraction = (boot_ns - before[0]) / (after[0] - before[0])
-            return to_attitude(slerp(before[1].quaternion, after[1].quaternion, fraction))
+            (_, first), (_, last) = before, after
+            # A reset is no turn: up to it the nose goes where it would have gone without.
+            end = headed(last.quaternion, first.heading_shift_rad - last.heading_shift_rad)
+            return slerp(first.quaternion, end, fraction), first.heading_shift_rad
         carried_ns = self._limits.extrapolation_ns if carried_ns is None else carried_ns
         near = _nearer(before, after, boot_ns, carried_ns)
         if near is None:
             return None
-        return to_attitude(turned(near[1].quaternion, near[1].body_rates_rps, (boot_ns - near[0]) * 1e-9))
+        at_ns, turning = near
+        carried = turned(turning.quaternion, turning.body_rates_rps, (boot_ns - at_ns) * 1e-9)
+        return carried, turning.heading_shift_rad
 
     def position_at(self, boot_ns: int, carried_ns: int | None = None) -> tuple[Vector, Vector] | None:
         """Position (NED, metres) and velocity (NED, metres a second) at `boot_ns`, or None.

@@ -64,6 +64,22 @@ def turned(q: Quaternion, body_rates_rps: tuple[float, float, float], seconds: f
     )
 
 
+def heading_between(a: Quaternion, b: Quaternion) -> float:
+    """The part about the vertical of the rotation from `a` to `b`, radians clockwise seen from above."""
+    aw, ax, ay, az = a
+    bw, bx, by, bz = b
+    w = bw * aw + bx * ax + by * ay + bz * az
+    z = bz * aw - bw * az + by * ax - bx * ay
+    return math.remainder(2 * math.atan2(z, w), math.tau)
+
+
+def headed(q: Quaternion, angle_rad: float) -> Quaternion:
+    """`q` turned about the vertical, clockwise seen from above."""
+    c, s = math.cos(angle_rad / 2), math.sin(angle_rad / 2)
+    w, x, y, z = q
+    return (c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w)
+
+
 def _unit(q: Quaternion) -> Quaternion:
     norm = math.sqrt(sum(value * value for value in q))
     return (q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm)

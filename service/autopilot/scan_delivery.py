@@ -49,7 +49,8 @@ class ScanDelivery:
         were seen: the best warning that there is.
         """
         read_ns = now_ns + self._transport.estimate_ns
-        here, there = self._tracker.telemetry_at(captured_ns), self._tracker.predicted(read_ns)
+        # Steady: where the heading is reset in between, the nose has not turned.
+        here, there = self._tracker.telemetry_at(captured_ns).steady, self._tracker.predicted(read_ns).steady
         if here.attitude is None or there.attitude is None:
             self.not_made_good += 1
             return _without_clear(scan)

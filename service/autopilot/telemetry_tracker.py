@@ -120,6 +120,7 @@ class TelemetryTracker:
         return Telemetry(
             at_ns=at_ns,
             attitude=self._motion.attitude_at(boot_ns, carried_ns),
+            heading_shift_rad=self._motion.heading_shift_at(boot_ns, carried_ns),
             height_m=self._motion.height_at(boot_ns),
             position_ned_m=position[0] if position else None,
             velocity_ned_mps=position[1] if position else None,

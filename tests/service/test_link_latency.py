@@ -38,6 +38,8 @@ class Turning:
         self.voice = Voice()
         self.yaw_rate = math.radians(yaw_rate_dps)
         self.north_mps = north_mps
+        self.reset_deg = 0.0
+        """How far the autopilot's heading has been reset."""
         self.step_ms = 0
         """How far the autopilot's clock has stepped."""
         self.silent = False
@@ -73,8 +75,8 @@ class Turning:
         if at_ms % 1000 == 0:
             yield self.voice.heartbeat()
         if at_ms % 20 == 0:
-            yaw = math.remainder(self.yaw(at_ms * MS), math.tau)
-            yield self.voice.attitude(boot_ms, yaw=yaw, yaw_rate=self.yaw_rate)
+            yaw = math.remainder(self.yaw(at_ms * MS) + math.radians(self.reset_deg), math.tau)
+            yield self.voice.attitude(boot_ms, yaw=yaw, yaw_rate=self.yaw_rate or 1e-4)
         if at_ms % 33 == 0:
             north_m = self.north_mps * at_ms / 1000
             yield self.voice.position(boot_ms, (north_m, 0.0, -5.0), (self.north_mps, 0.0, 0.0))
@@ -153,6 +155,34 @@ def test_r9_without_the_turn_made_good_the_same_bearing_would_be_18_degrees_off(
     assert flight.talk.session.status(flight.talk.now_ns).not_made_good == 1
     # Who does not know how far it has turned knows of no direction that it is free.
     assert set(message.distances) == {800, 65535}
+
+
+@pytest.mark.parametrize(("yaw_rate_dps", "reset_deg"), [(0.0, 40.0), (0.0, -170.0), (90.0, -30.0)])
+def test_a_heading_that_is_reset_while_a_scan_is_under_way_turns_nothing(
+    yaw_rate_dps: float, reset_deg: float
+) -> None:
+    flight = Turning(yaw_rate_dps)
+    flight.fly(3.0)
+    captured_ns = flight.talk.now_ns
+    flight.fly(0.1)
+    flight.reset_deg = reset_deg
+    flight.fly(0.1)
+    age_ms = (flight.talk.now_ns - captured_ns) // MS
+    message = flight.tell(pole(0.0, 8.0), age_ms)
+    found = told_at(message)
+    assert found
+    assert max(abs(bearing + yaw_rate_dps * age_ms / 1000) for bearing in found) < 5.0
+    assert min(message.distances) == 800
+
+
+def test_a_way_flown_while_the_heading_is_reset_is_made_good_ahead() -> None:
+    flight = Turning(north_mps=5.0)
+    flight.fly(3.0)
+    flight.reset_deg = 10.0
+    flight.fly(0.2)
+    message = flight.tell(pole(0.0, 8.0), age_ms=200)
+    assert told_at(message)[0] == pytest.approx(0.0, abs=5.0)
+    assert min(message.distances) == pytest.approx(700, abs=10)
 
 
 def test_what_is_ahead_is_told_nearer_by_the_way_flown_since_the_picture() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -203,18 +204,19 @@ def test_an_obstacle_that_leaves_the_picture_is_remembered_for_half_a_second() -
 
 
 @pytest.mark.parametrize(
-    ("position_m", "velocity_mps", "left_m"),
-    [(5.0, 0.0, 8.0), (0.0, 12.0, None)],
-    ids=["position", "velocity"],
+    ("position_m", "velocity_mps", "heading_rad", "left_m"),
+    [(5.0, 0.0, 0.0, 8.0), (0.0, 12.0, 0.0, None), (0.0, 0.0, 0.9, 8.0), (0.0, 0.0, -2.5, 8.0)],
+    ids=["position", "velocity", "heading", "heading the other way"],
 )
 def test_an_estimate_that_is_reset_moves_nothing_that_was_seen(
-    position_m: float, velocity_mps: float, left_m: float | None
+    position_m: float, velocity_mps: float, heading_rad: float, left_m: float | None
 ) -> None:
     perception = perception_of(FixedDepth(shrunk(wall_over_ground(CAMERA, 8.0))))
     here = replace(FLYING, position_ned_m=(0.0, 0.0, -FLYING_HEIGHT_M), velocity_ned_mps=(0.0, 0.0, 0.0))
     reset = replace(
         here,
-        attitude=Attitude(0.0, 0.0, 1.2),
+        attitude=Attitude(0.0, 0.0, math.remainder(1.2 + heading_rad, math.tau)),
+        heading_shift_rad=heading_rad,
         position_ned_m=(position_m, 0.0, -FLYING_HEIGHT_M),
         velocity_ned_mps=(velocity_mps, 0.0, 0.0),
     )

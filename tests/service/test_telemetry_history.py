@@ -70,6 +70,44 @@ def test_beyond_the_newest_message_the_rates_carry_for_50_ms() -> None:
     assert motion.attitude_at(151 * MS) is None
 
 
+def headings(
+    *yaws: tuple[int, float], rate_rps: float = 1e-3, start: float = 3.0
+) -> tuple[MotionHistory, list[float]]:
+    """Messages of yaw after `start` while the nose turns at a rate; the resets so far at each, in order."""
+    motion = MotionHistory(MotionLimits())
+    for at_ms, yaw in yaws:
+        attitude = Attitude(0.1, -0.2, math.remainder(start + yaw, math.tau))
+        motion.add_attitude(at_ms * MS, attitude, (0.0, rate_rps * math.sin(0.1), rate_rps))
+    return motion, [motion.heading_shift_at(at_ms * MS) for at_ms, _ in sorted(yaws)]
+
+
+def test_a_heading_that_jumps_without_a_turn_was_reset_and_the_nose_stayed() -> None:
+    motion, resets = headings((0, 0.0), (20, 0.0), (40, 0.7), (60, 0.7), (80, 0.3))
+    assert resets == pytest.approx([0.0, 0.0, 0.7, 0.7, 0.3], abs=1e-4)
+    between = motion.attitude_at(30 * MS)
+    assert between is not None
+    assert between.yaw_rad == pytest.approx(3.0, abs=1e-3), "halfway through a reset is nowhere"
+    assert motion.heading_shift_at(30 * MS) == 0.0
+
+
+@pytest.mark.parametrize("step_ms", [20, 100, 200])
+def test_a_turn_that_the_rates_tell_of_is_no_reset(step_ms: int) -> None:
+    turn = [(at_ms, 1.5 * at_ms / 1000) for at_ms in range(0, 2001, step_ms)]
+    _, resets = headings(*turn, rate_rps=1.5 / (math.cos(0.1) / math.cos(-0.2)))
+    assert not any(resets)
+
+
+def test_a_message_that_comes_late_is_put_on_its_side_of_the_reset() -> None:
+    for yaw, expected in ((0.0, [0.0, 0.0, 0.7]), (0.7, [0.0, 0.7, 0.7])):
+        _, resets = headings((0, 0.0), (40, 0.7), (20, yaw))
+        assert resets == pytest.approx(expected, abs=1e-4)
+
+
+def test_rates_that_nobody_measured_tell_of_no_reset() -> None:
+    _, resets = headings((0, 0.0), (100, 0.5), rate_rps=0.0)
+    assert not any(resets)
+
+
 def test_a_wide_gap_is_not_bridged() -> None:
     motion = history((0, Attitude(0, 0, 0)), (5000, Attitude(0, 0, 1)))
     assert motion.attitude_at(40 * MS) is not None

@@ -7,9 +7,22 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from link_support import SECOND_NS, Arrival, Conversation, TrueOffset, Voice, dataflash_rows, read_tlog
+from link_support import (
+    SECOND_NS,
+    Arrival,
+    Conversation,
+    TrueOffset,
+    Voice,
+    dataflash_rows,
+    decoded,
+    message_id,
+    read_tlog,
+)
 from numpy.typing import NDArray
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from service.autopilot.motion_history import MotionHistory, MotionLimits
+from uavdepth.attitude import Attitude
 
 LATENCY_NS = 80_000_000
 """A frame is looked up this long after its exposure, when the network is done with it."""
@@ -75,6 +88,22 @@ def errors_deg(
         axis=1,
     )
     return wrapped(found[:, 1:4] - truth[:, 1:]), wrapped(found[:, 1:4] - estimate)
+
+
+def test_the_reset_of_heading_in_the_log_is_found_and_no_other(flight: Recorded) -> None:
+    """EKF3 IMU0 MAG0 in-flight yaw alignment complete: 49.487 s; later it yaws at 45 degrees a second."""
+    motion, resets = MotionHistory(MotionLimits()), []
+    frames = [
+        each.data for each in flight.arrivals if message_id(each.data) == mavlink.MAVLINK_MSG_ID_ATTITUDE
+    ]
+    for said in decoded(frames):
+        at_ns, rates = said.time_boot_ms * 1_000_000, (said.rollspeed, said.pitchspeed, said.yawspeed)
+        motion.add_attitude(at_ns, Attitude(said.roll, said.pitch, said.yaw), rates)
+        resets.append((said.time_boot_ms / 1000, np.degrees(motion.heading_shift_at(at_ns))))
+    at_s, so_far_deg = np.array(resets).T
+    assert len(np.unique(so_far_deg)) == 2
+    assert at_s[so_far_deg != 0][0] == pytest.approx(49.487, abs=0.02)
+    assert so_far_deg[-1] == pytest.approx(-2.4, abs=0.1)
 
 
 def test_attitude_at_capture_time_is_the_true_one(flight: Recorded) -> None:
