@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from service.publisher.wire import ExtraCamera, StatusSample
+from service.publisher.status_wire import ExtraCamera, StatusSample
 from service.status import ServiceStatus, SideStatus
 
 

@@ -20,7 +20,8 @@ from service.frame import Frame
 from service.pipeline import PerceptionResult
 from service.process_end import end_process
 from service.publisher.publisher import ZenohPublisher
-from service.publisher.wire import ScanSample, StatusSample
+from service.publisher.status_wire import StatusSample
+from service.publisher.wire import ScanSample
 from service.settings.zenoh import ZenohSettings
 from service.telemetry import Telemetry
 from uavdepth.depth.codec import encode_depth_png

@@ -14,7 +14,8 @@ from service.clock import Clock
 from service.publisher import keys
 from service.publisher.picture_receiver import PictureReceiver
 from service.publisher.session import station_session
-from service.publisher.wire import DepthHeader, ScanSample, StatusSample, WireError
+from service.publisher.status_wire import StatusSample
+from service.publisher.wire import DepthHeader, ScanSample, WireError
 from service.watch.board import Board, VehicleView
 from service.watch.listener import Listener
 from uavdepth.depth.codec import decode_depth_png

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Self
 
 from service.clock import Clock
-from service.publisher.wire import StatusSample
+from service.publisher.status_wire import StatusSample
 from service.security.security import Security
 from service.settings.zenoh import ZenohSettings
 from service.watch.board import Board, VehicleView

@@ -15,7 +15,8 @@ from service.ground.history import HistoryPoint, NearestHistory, Reading, readin
 from service.ground.pictures import check_grey_png, check_jpeg
 from service.ground.traffic import Traffic, TrafficView
 from service.publisher import keys
-from service.publisher.wire import CameraHeader, DepthHeader, ScanSample, StatusSample, WireError
+from service.publisher.status_wire import StatusSample
+from service.publisher.wire import CameraHeader, DepthHeader, ScanSample, WireError
 
 MAX_VEHICLES = 200
 """A peer that invents names must not fill the memory: the longest silent one makes room, else none."""

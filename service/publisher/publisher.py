@@ -15,8 +15,9 @@ from service.publisher.line import RETRY_NS
 from service.publisher.picture_thread import PictureThread
 from service.publisher.scan_thread import ScanThread
 from service.publisher.session import open_session
+from service.publisher.status_wire import StatusSample
 from service.publisher.video import require_video
-from service.publisher.wire import Intrinsics, StatusSample
+from service.publisher.wire import Intrinsics
 from service.settings.zenoh import ZenohSettings
 from uavdepth.camera import CameraModel
 

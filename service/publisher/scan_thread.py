@@ -13,8 +13,9 @@ from service.latest_slot import LatestSlot
 from service.pipeline import PerceptionResult
 from service.publisher.line import Line, Open
 from service.publisher.rate_limit import RateLimit
+from service.publisher.status_wire import StatusSample
 from service.publisher.topics import ScanTopics
-from service.publisher.wire import ScanSample, StatusSample
+from service.publisher.wire import ScanSample
 from service.settings.zenoh import ZenohSettings
 
 log = structlog.get_logger()

@@ -14,7 +14,7 @@ from service.clock import Clock, MonotonicClock
 from service.errors import RecordError
 from service.perception_result import PerceptionResult
 from service.publisher.publisher import ZenohPublisher
-from service.publisher.wire import StatusSample
+from service.publisher.status_wire import StatusSample
 from service.settings import Settings
 from service.status import resident_memory_mib
 

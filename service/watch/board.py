@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from service.bad_samples import BadSamples
 from service.freshness import ArrivalClock, Freshness
 from service.publisher import keys
-from service.publisher.wire import ScanSample, StatusSample, WireError
+from service.publisher.status_wire import StatusSample
+from service.publisher.wire import ScanSample, WireError
 
 _MAX_VEHICLES = 200
 """A peer that invents names must not fill the memory."""

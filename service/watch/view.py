@@ -12,7 +12,8 @@ from rich.table import Table
 from rich.text import Text
 
 from service.freshness import Freshness
-from service.publisher.wire import ExtraCamera, ScanSample, StatusSample
+from service.publisher.status_wire import ExtraCamera, StatusSample
+from service.publisher.wire import ScanSample
 from service.watch.board import Board, VehicleView
 from uavdepth.scan.obstacle_scan import SectorState
 

@@ -20,8 +20,9 @@ from service.publisher import keys
 from service.publisher.budget import PictureBudget
 from service.publisher.picture_receiver import PictureReceiver
 from service.publisher.received import ReceivedReport
+from service.publisher.status_wire import StatusSample
 from service.publisher.video import VideoEncoder, VideoHeader
-from service.publisher.wire import CameraHeader, DepthHeader, Intrinsics, ScanSample, StatusSample
+from service.publisher.wire import CameraHeader, DepthHeader, Intrinsics, ScanSample
 from service.watch.board import Board
 from uavdepth.depth.codec import decode_depth_png, encode_codes_png
 from uavdepth.errors import UavDepthError

@@ -22,7 +22,8 @@ from service.ground.listener import FleetListener
 from service.ground.server import bind, make_server
 from service.publisher import keys
 from service.publisher.session import open_session
-from service.publisher.wire import CameraHeader, DepthHeader, Intrinsics, ScanSample, StatusSample
+from service.publisher.status_wire import StatusSample
+from service.publisher.wire import CameraHeader, DepthHeader, Intrinsics, ScanSample
 from uavdepth.camera import CameraModel
 from uavdepth.depth.codec import encode_depth_png
 from uavdepth.scan.obstacle_scan import ObstacleScan, SectorState, sector_bearings_deg

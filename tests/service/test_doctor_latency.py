@@ -20,7 +20,7 @@ from service.doctor.live_latency import KnownLatency, ServiceEar, latency_of, se
 from service.fake_autopilot.fake_autopilot import FakeAutopilot
 from service.freshness import Freshness
 from service.publisher.session import open_session
-from service.publisher.wire import StatusSample
+from service.publisher.status_wire import StatusSample
 from service.security.security import Security
 from service.settings.zenoh import ZenohSettings
 from service.watch.board import VehicleView

@@ -13,8 +13,9 @@ from service.clock import ManualClock, MonotonicClock
 from service.publisher.picture_receiver import PictureReceiver
 from service.publisher.publisher import ZenohPublisher
 from service.publisher.session import MAX_MESSAGE_BYTES, Role, open_session
+from service.publisher.status_wire import StatusSample
 from service.publisher.topics import PictureTopics
-from service.publisher.wire import CameraHeader, DepthHeader, ScanSample, StatusSample
+from service.publisher.wire import CameraHeader, DepthHeader, ScanSample
 from service.trouble import Trouble
 from uavdepth.depth.codec import decode_depth_png
 from uavdepth.depth.depth_map import DepthMap

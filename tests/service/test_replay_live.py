@@ -10,7 +10,8 @@ from test_link_sockets import udp_peer
 from test_publisher import listening
 from test_replay import WALL_M, flown, run
 
-from service.publisher.wire import ScanSample, StatusSample
+from service.publisher.status_wire import StatusSample
+from service.publisher.wire import ScanSample
 from service.replay import live_outputs
 from service.replay.live_outputs import LiveOutputs
 from service.replay.open_footage import open_flight

@@ -30,7 +30,7 @@ from service.frame import Frame
 from service.health import SEVERITY_WARNING
 from service.perception_result import PerceptionResult, unknown_scan
 from service.pipeline import Perception, make_scanner
-from service.publisher.wire import StatusSample
+from service.publisher.status_wire import StatusSample
 from service.replay.open_footage import open_flight
 from service.run import Service
 from service.settings import ExtraCameraSettings, Settings

@@ -12,7 +12,8 @@ from rich.console import Console
 from service.clock import MonotonicClock
 from service.freshness import Freshness
 from service.publisher.session import open_session
-from service.publisher.wire import MAX_SAMPLE_BYTES, ScanSample, StatusSample
+from service.publisher.status_wire import StatusSample
+from service.publisher.wire import MAX_SAMPLE_BYTES, ScanSample
 from service.watch.board import Board
 from service.watch.listener import Listener
 from service.watch.view import board_json, render_board

@@ -12,14 +12,8 @@ from hypothesis import strategies as st
 
 from service.publisher.keys import key, vehicle_of
 from service.publisher.rate_limit import RateLimit
-from service.publisher.wire import (
-    CameraHeader,
-    DepthHeader,
-    Intrinsics,
-    ScanSample,
-    StatusSample,
-    WireError,
-)
+from service.publisher.status_wire import StatusSample
+from service.publisher.wire import CameraHeader, DepthHeader, Intrinsics, ScanSample, WireError
 from uavdepth.camera import CameraModel
 from uavdepth.scan.obstacle_scan import SECTOR_COUNT, ObstacleScan, SectorState, sector_bearings_deg
 
