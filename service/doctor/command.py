@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import signal
 import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -68,8 +70,8 @@ def doctor(
     """Say why obstacles would not show or not stop the vehicle, each with the fix.
 
     It listens to the autopilot, asks for message rates as `run` does, and reads parameters; where a service
-    runs for this vehicle, it takes the measured latency from its status. Exit codes: 0 no
-    failure (there may be warnings), 1 a failure, 2 a wrong configuration or command line.
+    runs for this vehicle, it takes the measured latency from its status. Exit codes: 0 no failure (there may
+    be warnings), 1 a failure, 2 a wrong configuration or command line.
     """
     from service.autopilot.signing_key import load_signing_key
     from service.clock import MonotonicClock
@@ -83,39 +85,30 @@ def doctor(
     from service.settings.load import load_settings
 
     given = list(overrides or ())
-    if config is None:
-        given.insert(0, "camera.source=sim:wall")  # a camera must be named, though nothing here looks at it
     if autopilot is not None:
         given.append(f"autopilot.endpoint={autopilot}")
-    settings = load_settings(config, given)
+    settings = load_settings(config, given, needs_camera=False)
+    check_endpoints("--connect", connect or [])
     if fix is not None and fix.exists():
         raise ConfigError(f"--fix {fix}: exists already; give a new file")
     scan = settings.scan
     trusted_m = scan.max_distance_m if range_m is None else min(range_m, scan.max_distance_m)
     key_file = settings.autopilot.signing_key_file
     key = load_signing_key(Path(key_file).expanduser()) if key_file else None
-    plan = plan_of(settings.autopilot, scan.min_distance_m, trusted_m, latency_s, signs=key is not None)
-    check_endpoints("--connect", connect or [])
-    clock = MonotonicClock()
-    places = connect or service_endpoints(settings.zenoh)
-    name = settings.vehicle.name if "name" in settings.vehicle.model_fields_set else None
-    ear = ServiceEar(places if live and latency_s is None else (), settings.zenoh.security, name, clock)
-
-    stop = threading.Event()
-    before = {
-        number: signal.signal(number, lambda _number, _frame: stop.set())
-        for number in (signal.SIGINT, signal.SIGTERM)
-    }
+    plan = plan_of(settings.autopilot, scan.min_distance_m, trusted_m, signs=key is not None)
     examination = Examination(settings.autopilot, plan, scan.max_distance_m, key, probe)
-    try:
-        with ear:
-            seen = listen(examination, settings.autopilot.endpoint, seconds, clock, stop)
-            known = KnownLatency(latency_s, "given with --latency" if latency_s is not None else "--no-live")
-            if live and latency_s is None:
-                known = ear.latency(seen.system_id, stop)
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    clock = MonotonicClock()
+    with ExitStack() as stack:
+        stop = stack.enter_context(_set_by_signals())
+        ear: ServiceEar | None = None
+        if live and latency_s is None:
+            name = settings.vehicle.name if "name" in settings.vehicle.model_fields_set else None
+            places = connect or service_endpoints(settings.zenoh)
+            ear = stack.enter_context(ServiceEar(places, settings.zenoh.security, name, clock))
+        seen = listen(examination, settings.autopilot.endpoint, seconds, clock, stop)
+        known = KnownLatency(latency_s, "--no-live" if latency_s is None else "given with --latency")
+        if ear is not None:
+            known = ear.latency(seen.system_id, stop)
     plan = replace(plan, latency_s=known.seconds, latency_source=known.source)
     findings = examine(seen, plan)
 
@@ -129,6 +122,21 @@ def doctor(
         _write_fixes(fix, findings, seen)
     if has_failure(findings):
         raise typer.Exit(EXIT_FAILURE)
+
+
+@contextmanager
+def _set_by_signals() -> Iterator[threading.Event]:
+    """An event that SIGINT and SIGTERM set instead of ending the program, for as long as the block lasts."""
+    stop = threading.Event()
+    before = {
+        number: signal.signal(number, lambda _number, _frame: stop.set())
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _write_fixes(path: Path, findings: list[Finding], seen: Observation) -> None:

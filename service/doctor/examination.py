@@ -241,7 +241,7 @@ def plan_of(
     settings: AutopilotSettings,
     nearest_m: float,
     range_m: float,
-    latency_s: float | None = None,
+    *,
     signs: bool = False,
 ) -> Plan:
     """What the service means to do by its settings."""
@@ -251,7 +251,6 @@ def plan_of(
         rate_hz=settings.obstacle_rate_hz,
         system_id=settings.system_id,
         wanted_hz={stream.message: stream.rate_hz for stream in wanted_streams(settings)},
-        latency_s=latency_s,
         signs=signs,
         bytes_per_s=bytes_per_s_of(settings.bytes_per_s, settings.endpoint),
         sends_3d=settings.obstacle_points,

@@ -125,12 +125,14 @@ def slowest_latency_ms(status: StatusSample) -> float | None:
 
 
 def service_endpoints(zenoh: ZenohSettings) -> tuple[str, ...]:
-    """Where the service of a vehicle's configuration is heard: where it listens, on this computer, and the
-    routers that it connects to.
+    """Where a service is heard by a configuration: where it listens, on this computer, and where it connects.
+
+    A viewer's file with certificates names no place to listen, and the default one is without TLS.
     """
     if not zenoh.enabled:
         return ()
-    return (*(_reachable(endpoint) for endpoint in zenoh.listen), *zenoh.connect)
+    listens = "listen" in zenoh.model_fields_set or not zenoh.ca
+    return (*(_reachable(endpoint) for endpoint in zenoh.listen if listens), *zenoh.connect)
 
 
 def _reachable(endpoint: str) -> str:

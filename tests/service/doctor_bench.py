@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -49,7 +50,7 @@ class Bench:
         self.autopilot = SimulatedAutopilot(
             make_controller(flavor, system_id=system_id, parameters=parameters), 60.0
         )
-        self.plan = plan_of(settings, 0.2, 20.0, latency_s=0.1, signs=own_key is not None)
+        self.plan = replace(plan_of(settings, 0.2, 20.0, signs=own_key is not None), latency_s=0.1)
         self.examination = Examination(
             settings, self.plan, 20.0, None if own_key is None else SigningKey(own_key), probe
         )

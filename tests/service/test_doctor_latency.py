@@ -90,6 +90,11 @@ def test_a_service_is_looked_for_where_its_own_configuration_lets_it_listen(
     assert service_endpoints(settings.model_copy(update={"enabled": False})) == ()
 
 
+def test_a_viewers_file_leads_to_where_it_connects() -> None:
+    settings = ZenohSettings(connect=("tls/router:7447",), ca="ca.pem", certificate="a.pem", key="a.key")
+    assert service_endpoints(settings) == ("tls/router:7447",)
+
+
 def test_a_running_service_is_asked_over_zenoh() -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     stop = threading.Event()
