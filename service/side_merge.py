@@ -66,4 +66,5 @@ class SideMerge:
         if here is None or then is None or has_jumped(seen.telemetry, main.telemetry):
             return Trouble.NO_POSITION
         turned_rad, moved_m = then.motion_to(here)
-        return moved_scan(seen.scan, turned_rad, moved_m)
+        reset_rad = main.telemetry.heading_shift_rad - seen.telemetry.heading_shift_rad
+        return moved_scan(seen.scan, turned_rad - reset_rad, moved_m)
