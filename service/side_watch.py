@@ -7,7 +7,7 @@ from collections.abc import Callable
 import structlog
 
 from service.cameras.reader import CameraStatus
-from service.health import SEVERITY_INFO, SEVERITY_WARNING, STALL_NS, Vitals, trouble_of
+from service.health import SEVERITY_CRITICAL, SEVERITY_INFO, SEVERITY_WARNING, STALL_NS, Vitals, trouble_of
 from service.progress import Progress
 from service.status import SideStatus
 from service.trouble import Trouble
@@ -15,7 +15,10 @@ from service.trouble import Trouble
 log = structlog.get_logger()
 
 _SETTLED_NS = 1_000_000_000
-"""A side that is lost or back is told when it has been so for a second."""
+"""A side that lacks something, or is back, is told when it has been so for a second."""
+
+_FAILED_NS = 300_000_000
+"""One that has failed is told sooner: to ArduPilot its directions are free from now on (measured)."""
 
 
 class SideWatch:
@@ -35,7 +38,8 @@ class SideWatch:
         self.progress = Progress(started_ns)
         """What became of its pictures."""
         self._trouble: Trouble | None = None
-        self._is_lost = False
+        self._told: Trouble | None = None
+        """What the pilot was told of; None if the side is well."""
         self._changed_ns: int | None = None
         self._losses = 0
 
@@ -48,16 +52,19 @@ class SideWatch:
             left_out: why the last merged scan is without it; None if it is in it or nothing is merged.
             is_sending: distances are sent.
         """
-        self._trouble = self._find_trouble(now_ns, camera, left_out, is_sending=is_sending)
-        is_lost = self._trouble is not None
-        if is_lost is self._is_lost:
+        trouble = self._find_trouble(now_ns, camera, left_out)
+        # Without distances a lack is no news, nor is it any news of a side that was missing before.
+        matters = is_sending or (self._told is not None and not self._told.is_fault)
+        self._trouble = trouble if trouble is not None and (matters or trouble.is_fault) else None
+        if (self._trouble is None) is (self._told is None):
             self._changed_ns = None
             return
         if self._changed_ns is None:
             self._changed_ns = now_ns
-        if now_ns - self._changed_ns >= _SETTLED_NS:
-            self._is_lost, self._changed_ns = is_lost, None
-            self._tell(camera)
+        has_failed = self._trouble is not None and self._trouble.is_fault
+        if now_ns - self._changed_ns >= (_FAILED_NS if has_failed else _SETTLED_NS):
+            self._told, self._changed_ns = self._trouble, None
+            self._tell(camera, SEVERITY_CRITICAL if is_sending else SEVERITY_WARNING)
 
     def status(self, now_ns: int, camera: CameraStatus, model_failures: int) -> SideStatus:
         """The side now."""
@@ -79,9 +86,7 @@ class SideWatch:
         sent_ns = self.progress.sent_ns
         return sent_ns is not None and now_ns - sent_ns <= STALL_NS
 
-    def _find_trouble(
-        self, now_ns: int, camera: CameraStatus, left_out: Trouble | None, *, is_sending: bool
-    ) -> Trouble | None:
+    def _find_trouble(self, now_ns: int, camera: CameraStatus, left_out: Trouble | None) -> Trouble | None:
         if self._is_used(now_ns):
             return None
         progress = self.progress
@@ -100,9 +105,10 @@ class SideWatch:
         trouble = trouble_of(vitals)
         if trouble is Trouble.NOT_SENT:  # all is well up to the merging
             trouble = left_out
-        return trouble if trouble is not None and (is_sending or trouble.is_fault) else None
+        return trouble
 
-    def _tell(self, camera: CameraStatus) -> None:
+    def _tell(self, camera: CameraStatus, severity: int) -> None:
+        """Say what has changed; a loss with `severity`."""
         if self._trouble is None:
             log.info("side camera ON", camera=self._name)
             self._say(SEVERITY_INFO, f"uavdepth: camera {self._name} ON")
@@ -111,4 +117,4 @@ class SideWatch:
         result = self.progress.result
         because = camera.detail or ("" if result is None else result.detail)
         log.warning("side camera OFF", camera=self._name, trouble=self._trouble.value, because=because)
-        self._say(SEVERITY_WARNING, f"uavdepth: camera {self._name} OFF")
+        self._say(severity, f"uavdepth: camera {self._name} OFF")

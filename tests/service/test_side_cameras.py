@@ -27,7 +27,7 @@ from service.cameras.reader import CameraState, CameraStatus
 from service.clock import MonotonicClock
 from service.errors import CameraError, ConfigError
 from service.frame import Frame
-from service.health import SEVERITY_WARNING
+from service.health import SEVERITY_CRITICAL, SEVERITY_WARNING
 from service.perception_result import PerceptionResult, unknown_scan
 from service.pipeline import Perception, make_scanner
 from service.publisher.status_wire import StatusSample
@@ -163,7 +163,7 @@ def test_a_side_that_dies_in_flight_is_unknown_and_in_the_status() -> None:
         assert side.age_s is not None
         assert side.frames_per_s > 0
         wait_until(lambda: sends() == SectorState.UNKNOWN and bool(link.said))
-        assert link.said == [(SEVERITY_WARNING, "uavdepth: camera right OFF")]
+        assert link.said == [(SEVERITY_CRITICAL, "uavdepth: camera right OFF")]
         (side,) = sides.status(link.clock.now_ns())
         assert (side.used, side.trouble, side.losses) == (False, Trouble.CAMERA_LOST, 1)
         assert side.camera.detail
@@ -231,13 +231,28 @@ def test_a_side_that_is_missing_from_what_is_sent_is_told_once_and_when_it_is_ba
 ) -> None:
     side = Bystander()
     assert side.goes_on(2.0, is_sending=True).used
-    assert side.goes_on(1.0, is_sending=True, **missing).losses == 0  # it may be a flicker
+    assert side.goes_on(0.6, is_sending=True, **missing).losses == 0  # it may be a flicker
     missed = side.goes_on(5.0, is_sending=True, **missing)
     assert not missed.used
     assert missed.trouble is missing.get("trouble", missing.get("left_out", Trouble.CAMERA_LOST))
     assert missed.losses == 1
     assert side.goes_on(2.0, is_sending=True).used
     assert side.said == ["uavdepth: camera right OFF", "uavdepth: camera right ON"]
+
+
+def test_a_side_that_failed_is_told_within_0_8_s_of_its_last_picture() -> None:
+    side = Bystander()
+    side.goes_on(2.0, is_sending=True)
+    side.goes_on(0.8, is_sending=True, delivers=False)
+    assert side.said == ["uavdepth: camera right OFF"]
+
+
+def test_a_side_is_not_back_because_all_are_off() -> None:
+    side = Bystander()
+    side.goes_on(2.0, is_sending=True)
+    side.goes_on(3.0, Trouble.NO_POINTS, is_sending=True)
+    assert side.goes_on(3.0, Trouble.NO_POINTS).trouble is Trouble.NO_POINTS
+    assert side.said == ["uavdepth: camera right OFF"]
 
 
 def test_a_main_camera_in_trouble_silences_all() -> None:
