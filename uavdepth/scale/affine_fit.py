@@ -54,6 +54,8 @@ class AffineFit:
     def clear(self) -> None:
         """Forget everything."""
         self.shape: AffineShape | None = None
+        self.ground: GroundScale | None = None
+        """What the ground says of the last picture's fitted depth; None where it is not seen."""
 
     def update(
         self,
@@ -62,7 +64,7 @@ class AffineFit:
         points: PointHints | None,
         passed_s: float,
     ) -> float:
-        """Fit `shape` anew; it stays None as long as nothing told it.
+        """Fit `shape` anew, and hear the ground; the shape stays None as long as nothing told it.
 
         Args:
             values: (H, W) affine inverse depth.
@@ -76,14 +78,14 @@ class AffineFit:
         """
         before = self.shape
         by_points = self._point_samples(values, points)
+        samples = by_points
         if ground is not None:
             samples = by_points.with_more(self._ground_samples(values, ground))
-            self.shape = fit_affine(samples, before, passed_s)
-            if self.shape is not None and not self._is_ground(values, ground):
-                self.shape = before
-                ground = None
-        if ground is None:
+        self.shape = fit_affine(samples, before, passed_s)
+        self.ground = self._ground_scale(values, ground)
+        if ground is not None and not self._is_sure_of_ground:
             self.shape = fit_affine(by_points, before, passed_s)
+            self.ground = self._ground_scale(values, ground)
         if before is None or self.shape is None:
             return 0.0
         held = before.inverse_m(self.shape.network(self.shape.pivot))
@@ -101,19 +103,18 @@ class AffineFit:
         with np.errstate(divide="ignore", over="ignore"):
             return np.asarray(1 / np.maximum(inverse, np.float32(0.0)))
 
-    def ground_scale(self, values: NDArray[np.float32], ground: GroundHint) -> GroundScale | None:
-        """What the ground says of fitted depth, or None where it is not seen or nothing was fitted."""
-        if self.shape is None:
+    @property
+    def _is_sure_of_ground(self) -> bool:
+        return self.ground is not None and self.ground.relative_sigma <= _LARGEST_GROUND_SIGMA
+
+    def _ground_scale(self, values: NDArray[np.float32], ground: GroundHint | None) -> GroundScale | None:
+        if self.shape is None or ground is None:
             return None
         found = self._scaler.estimate(self.depth_m(values), ground.attitude, ground.height_m)
         if found is None:
             return None
         sigma = math.hypot(found.relative_sigma, self._beyond_infinity(values, self.shape))
         return replace(found, relative_sigma=sigma)
-
-    def _is_ground(self, values: NDArray[np.float32], ground: GroundHint) -> bool:
-        found = self.ground_scale(values, ground)
-        return found is not None and found.relative_sigma <= _LARGEST_GROUND_SIGMA
 
     def _beyond_infinity(self, values: NDArray[np.float32], shape: AffineShape) -> float:
         """By how much of the pivot's inverse depth the shift is too small at least: ground that rises ahead

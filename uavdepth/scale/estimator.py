@@ -161,8 +161,7 @@ class ScaleEstimator:
         self._filter.shift(self._fit.update(values, ground, points, passed_s))
         if self._fit.shape is None:
             return None
-        by_ground = None if ground is None else self._fit.ground_scale(values, ground)
-        self._listen(self._fit.depth_m(values), by_ground, points, passed_s)
+        self._listen(self._fit.depth_m(values), self._fit.ground, points, passed_s)
         return self._estimate()
 
     def _listen(
