@@ -108,13 +108,15 @@ def test_r12_two_cameras_make_one_scan_with_the_obstacles_of_both() -> None:
     assert both.scan.distance_m[RIGHT] == pytest.approx(WALL_M, rel=0.05)
 
 
-def test_a_side_is_turned_with_the_vehicle_to_the_moment_of_the_main_picture() -> None:
+@pytest.mark.parametrize("reset_deg", [0.0, 50.0])
+def test_a_side_is_turned_with_the_vehicle_to_the_moment_of_the_main_picture(reset_deg: float) -> None:
     link = FakeLink(MonotonicClock())
     with looking(link, endless()) as (sides, perception):
         wait_until(lambda: sides.added_to(look(perception, link)).scan.state[RIGHT] == SectorState.OBSTACLE)
         main = look(perception, link)
         # 30 degrees to the right since: what was at 90 degrees is at 60.
-        telemetry = replace(main.telemetry, attitude=Attitude(0.0, 0.0, math.radians(30)))
+        told = Attitude(0.0, 0.0, math.radians(30 + reset_deg))
+        telemetry = replace(main.telemetry, attitude=told, heading_shift_rad=math.radians(reset_deg))
         turned = sides.added_to(replace(main, telemetry=telemetry))
     span = np.flatnonzero(turned.scan.state == SectorState.OBSTACLE)
     straight = np.flatnonzero(look(main_perception(), link).scan.state == SectorState.OBSTACLE)
