@@ -92,10 +92,10 @@ class GroundHints:
 def _carried_on(captured_ns: int, telemetry_at: Callable[[int], Telemetry]) -> Attitude | None:
     """The attitude that the last known turn leads to, or None where none was heard lately."""
     for lag_ns in LAGS_NS:
-        last = telemetry_at(captured_ns - lag_ns).attitude
+        last = telemetry_at(captured_ns - lag_ns).steady.attitude
         if last is None or not _is_finite(last):
             continue
-        earlier = telemetry_at(captured_ns - lag_ns - _STEP_NS).attitude
+        earlier = telemetry_at(captured_ns - lag_ns - _STEP_NS).steady.attitude
         if earlier is None or not _is_finite(earlier):
             return last
         return to_attitude(slerp(from_attitude(earlier), from_attitude(last), 1.0 + lag_ns / _STEP_NS))
