@@ -63,6 +63,7 @@ class Monitor:
         self._publish_period_ns = publish_period_ns
         self._on_loss = on_loss
         self._hold_told: HoldOutcome | None = None
+        self._hold_mode = ""
         self._publish_due_ns = started_ns
         self._announcer = Announcer()
         self._was_armed: bool | None = None
@@ -137,19 +138,21 @@ class Monitor:
             self._link.newest_pose(),
         )
         if on_loss.hear(moment):
-            mode = self._link.hold()
-            text = f"uavdepth: asks for {mode}" if mode else "uavdepth: knows no mode that stops this vehicle"
-            self._link.say(SEVERITY_CRITICAL, text)
+            self._hold_mode = self._link.hold()
+            if not self._hold_mode:
+                self._link.say(SEVERITY_CRITICAL, "uavdepth: knows no mode that stops this vehicle")
             log.warning(
-                "asks the vehicle to hold",
-                mode=mode,
+                "wants the vehicle to hold",
+                mode=self._hold_mode,
                 because=self.trouble and self.trouble.value,
                 flown_in=moment.mode,
                 speed_mps=speed_mps(moment.pose),
                 way_m=round(on_loss.way_m, 2),
             )
         if link.hold is not self._hold_told:
-            self._hold_told = link.hold
+            was_asked, self._hold_told = self._hold_told is HoldOutcome.ASKED, link.hold
+            if link.hold is HoldOutcome.ASKED or (link.hold is HoldOutcome.GRANTED and not was_asked):
+                self._link.say(SEVERITY_CRITICAL, f"uavdepth: asks for {self._hold_mode}")
             if link.hold in (HoldOutcome.REFUSED, HoldOutcome.UNANSWERED):
                 self._link.say(SEVERITY_CRITICAL, f"uavdepth: hold {link.hold.value}, fly by hand")
             if link.hold is not None:

@@ -10,6 +10,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from service.autopilot.presence import COMPONENT_ID
 from service.autopilot.vehicle import Vehicle
 
+_MODE_TOLD_NS = 200_000_000
+"""The autopilot is given so long to tell its mode first, which it does once a second by itself: ArduPilot
+opens the way 0.3 s after a hold is asked for at the earliest."""
+
 _ANSWER_NS = 300_000_000
 _MOST_TRIES = 3
 """A request without an answer is taken for lost and sent again, twice."""
@@ -38,6 +42,8 @@ _ROVERS = frozenset({mavlink.MAV_TYPE_GROUND_ROVER, mavlink.MAV_TYPE_SURFACE_BOA
 class HoldOutcome(StrEnum):
     """What has become of a request."""
 
+    WANTED = "wanted"
+    """The autopilot is asked for its mode."""
     ASKED = "asked"
     GRANTED = "granted"
     REFUSED = "refused"
@@ -46,6 +52,9 @@ class HoldOutcome(StrEnum):
     """Somebody else has chosen another mode."""
     IMPOSSIBLE = "impossible"
     """No mode of this vehicle is known to stop it."""
+
+
+_OPEN = frozenset({HoldOutcome.WANTED, HoldOutcome.ASKED})
 
 
 @dataclass(frozen=True)
@@ -83,6 +92,8 @@ def hold_modes(vehicle: Vehicle) -> list[HoldMode]:
 class HoldRequest:
     """One request, from the first command to its end. Only a command without an answer is sent again.
 
+    First the autopilot is asked for a HEARTBEAT: the pilot may have chosen another mode since the last one.
+
     Args:
         vehicle: whom it is for.
     """
@@ -93,7 +104,8 @@ class HoldRequest:
         self._modes = hold_modes(vehicle)
         self._tries = 0
         self._due_ns = 0
-        self.outcome = HoldOutcome.ASKED if self._modes else HoldOutcome.IMPOSSIBLE
+        self._is_mode_asked = self._is_mode_told = False
+        self.outcome = HoldOutcome.WANTED if self._modes else HoldOutcome.IMPOSSIBLE
         """What has become of it."""
 
     @property
@@ -103,29 +115,40 @@ class HoldRequest:
 
     def due(self, now_ns: int) -> mavlink.MAVLink_command_long_message | None:
         """The command, if it is time to send it."""
-        if self.outcome is not HoldOutcome.ASKED or now_ns < self._due_ns:
+        if self.outcome not in _OPEN:
+            return None
+        if not self._is_mode_asked:
+            self._is_mode_asked, self._due_ns = True, now_ns + _MODE_TOLD_NS
+            return self._command(mavlink.MAV_CMD_REQUEST_MESSAGE, 0, float(mavlink.MAVLINK_MSG_ID_HEARTBEAT))
+        if now_ns < self._due_ns and (self._tries or not self._is_mode_told):
             return None
         if self._tries >= _MOST_TRIES:
             self.outcome = HoldOutcome.UNANSWERED
             return None
         self._due_ns = now_ns + _ANSWER_NS
         wanted = self._modes[0]
-        command = mavlink.MAVLink_command_long_message(
-            self._system_id,
-            mavlink.MAV_COMP_ID_AUTOPILOT1,
+        command = self._command(
             mavlink.MAV_CMD_DO_SET_MODE,
             self._tries,
             float(mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED),
             float(wanted.main),
             float(wanted.sub),
-            *[0.0] * 4,
         )
         self._tries += 1
+        self.outcome = HoldOutcome.ASKED
         return command
+
+    def _command(
+        self, command: int, confirmation: int, *values: float
+    ) -> mavlink.MAVLink_command_long_message:
+        parameters = [*values, *[0.0] * (7 - len(values))]
+        return mavlink.MAVLink_command_long_message(
+            self._system_id, mavlink.MAV_COMP_ID_AUTOPILOT1, command, confirmation, *parameters
+        )
 
     def give_up(self) -> None:
         """The line was silent: what was asked then must not reach a pilot who flies by hand by now."""
-        if self.outcome is HoldOutcome.ASKED:
+        if self.outcome in _OPEN:
             self.outcome = HoldOutcome.UNANSWERED
 
     def on_ack(self, ack: mavlink.MAVLink_command_ack_message) -> None:
@@ -152,6 +175,7 @@ class HoldRequest:
         """The mode in a HEARTBEAT: the wanted one grants, a third one is somebody else's wish."""
         if not self._modes:
             return
+        self._is_mode_told = self._is_mode_asked
         if custom_mode == self._modes[0].custom_mode:
             self.outcome, self._flown_in = HoldOutcome.GRANTED, custom_mode
         elif custom_mode != self._flown_in:

@@ -28,6 +28,14 @@ class Talk:
     def beat(self, mode: int) -> None:
         self.talk.hear(self.voice.heartbeat(self.kind, self.autopilot, custom_mode=mode))
 
+    def ask(self) -> str:
+        """Ask, and let the vehicle tell its mode, so that the request leaves; the mode that is asked for."""
+        mode = self.talk.session.ask_to_hold()
+        self.talk.wait_s(0.05)
+        self.beat(self.mode)
+        self.talk.wait_s(0.05)
+        return mode
+
     def answer(self, result: int, component: int = 196) -> None:
         ack = mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_DO_SET_MODE, result, 0, 0, 1, component)
         self.talk.hear(self.voice.pack(ack))
@@ -40,6 +48,12 @@ class Talk:
             for _, m in self.talk.sent_of("COMMAND_LONG")
             if m.command == mavlink.MAV_CMD_DO_SET_MODE
         ]
+
+    @property
+    def mode_requests(self) -> int:
+        """How often the vehicle was asked for a HEARTBEAT."""
+        heartbeat = (mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_HEARTBEAT)
+        return sum((m.command, m.param1) == heartbeat for _, m in self.talk.sent_of("COMMAND_LONG"))
 
     @property
     def outcome(self) -> HoldOutcome | None:

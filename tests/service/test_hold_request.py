@@ -10,6 +10,38 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from service.autopilot.hold_request import HoldOutcome
 
 
+class TestWhoFliesNow:
+    """HEARTBEAT tells the mode once a second: it is asked for before anything else is."""
+
+    def test_the_autopilot_is_asked_for_its_mode_first(self) -> None:
+        talk = Talk()
+        talk.talk.session.ask_to_hold()
+        talk.talk.wait_s(0.1)
+        assert talk.mode_requests == 1
+        assert talk.commands == []
+        talk.beat(5)
+        talk.talk.wait_s(0.05)
+        assert len(talk.commands) == 1
+        assert talk.mode_requests == 1
+
+    def test_a_pilot_who_has_taken_over_meanwhile_is_left_alone(self) -> None:
+        talk = Talk()
+        talk.talk.session.ask_to_hold()
+        talk.talk.wait_s(0.1)
+        talk.beat(2)
+        talk.talk.wait_s(2.0)
+        assert talk.commands == []
+        assert talk.outcome is HoldOutcome.OVERRULED
+
+    def test_an_autopilot_that_does_not_tell_is_asked_to_hold_0_2_s_later(self) -> None:
+        talk = Talk()
+        talk.talk.session.ask_to_hold()
+        talk.talk.wait_s(0.18)
+        assert talk.commands == []
+        talk.talk.wait_s(0.06)
+        assert len(talk.commands) == 1
+
+
 class TestHowItIsAsked:
     @pytest.mark.parametrize(
         ("autopilot", "kind", "mode", "name", "command"),
@@ -24,8 +56,7 @@ class TestHowItIsAsked:
         self, autopilot: int, kind: int, mode: int, name: str, command: tuple[int, int, int]
     ) -> None:
         talk = Talk(autopilot, kind, mode)
-        assert talk.talk.session.ask_to_hold() == name
-        talk.talk.wait_s(0.1)
+        assert talk.ask() == name
         talk.answer(mavlink.MAV_RESULT_ACCEPTED)
         talk.talk.wait_s(2.0)
         assert talk.commands == [command]
@@ -47,7 +78,7 @@ class TestHowItIsAsked:
 
     def test_a_refused_brake_becomes_loiter_and_a_refused_loiter_is_the_end(self) -> None:
         talk = Talk(mode=4)
-        talk.talk.session.ask_to_hold()
+        talk.ask()
         for _ in range(2):
             talk.talk.wait_s(0.1)
             talk.answer(mavlink.MAV_RESULT_FAILED)
@@ -57,15 +88,13 @@ class TestHowItIsAsked:
 
     def test_the_answer_to_another_stations_command_is_not_taken_for_ours(self) -> None:
         talk = Talk()
-        talk.talk.session.ask_to_hold()
-        talk.talk.wait_s(0.1)
+        talk.ask()
         talk.answer(mavlink.MAV_RESULT_FAILED, component=190)
         assert talk.outcome is HoldOutcome.ASKED
 
     def test_a_mode_that_somebody_else_has_chosen_ends_the_request(self) -> None:
         talk = Talk()
-        talk.talk.session.ask_to_hold()
-        talk.talk.wait_s(0.1)
+        talk.ask()
         talk.beat(0)
         talk.talk.wait_s(2.0)
         assert len(talk.commands) == 1
@@ -73,8 +102,7 @@ class TestHowItIsAsked:
 
     def test_a_granted_request_is_not_sent_again_when_the_pilot_flies_on(self) -> None:
         talk = Talk()
-        talk.talk.session.ask_to_hold()
-        talk.talk.wait_s(0.1)
+        talk.ask()
         talk.beat(17)
         assert talk.outcome is HoldOutcome.GRANTED
         talk.beat(5)

@@ -278,6 +278,18 @@ def test_a_hovering_vehicle_is_held_once_when_it_sets_out_without_distances(stic
     assert len(flight.asked) == 1
 
 
+@pytest.mark.parametrize("late_s", [0.1, 0.4, 0.7, 0.9])
+def test_a_pilot_who_takes_over_from_a_hover_and_flies_off_is_not_stopped(late_s: float) -> None:
+    """The autopilot tells its mode once a second only."""
+    flight = HoldFlight("ardupilot", "LOITER", ARMING_SKIPCHK=-1.0)
+    flight.trouble = Trouble.CAMERA_LOST
+    flight.fly(2.0 + late_s)
+    flight.controller.set_mode("ALT_HOLD")
+    flight.fly(3.0, stick=1.0)
+    assert flight.asked == []
+    assert flight.speed_mps > 3.0
+
+
 def test_a_camera_that_dies_in_flight_stops_the_vehicle_and_a_pilot_who_takes_over_flies() -> None:
     """Real MAVLink over TCP; only the camera and the network are stand-ins."""
     with FakeAutopilot("ardupilot", "tcp:127.0.0.1:0", parameters={"PRX_FILT": 0.0}) as autopilot:
