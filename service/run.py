@@ -30,6 +30,7 @@ from service.settings import Settings
 from service.side_cameras import SideCameras
 from service.status import Drops, ServiceStatus, altitude_m, resident_memory_mib, speed_mps
 from service.status_sample import status_sample
+from service.subscribers import Subscribers
 from service.thread_rank import switch_quickly
 from service.trouble import Trouble
 from uavdepth.errors import UavDepthError
@@ -96,8 +97,7 @@ class Service:
         self._perception: Perception | None = None
         self._stopping = threading.Event()
         self._stopped = False
-        self._subscribers: list[LatestSlot[PerceptionResult]] = []
-        self._subscribers_lock = threading.Lock()
+        self._subscribers = Subscribers()
         self._started_ns = self._clock.now_ns()
         self._progress = Progress(self._started_ns)
         self._thread = threading.Thread(target=self._perceive, name="perception", daemon=True)
@@ -170,14 +170,13 @@ class Service:
         self._link.close()
         if self._recorder is not None:
             self._recorder.stop()
-        with self._subscribers_lock:
-            for slot in self._subscribers:
-                slot.close()
+        self._subscribers.close()
 
     @property
     def failure(self) -> UavDepthError | None:
-        """Why the service can never work as configured, or None."""
-        return self._reader.failure
+        """Why the service can never work as configured, or None; a further camera's counts on the ground."""
+        has_flown = self._progress.sent_ns is not None or self._link.status().armed is True
+        return self._reader.failure or (None if has_flown else self._sides.failure)
 
     @property
     def ended(self) -> bool:
@@ -191,10 +190,7 @@ class Service:
 
     def subscribe(self) -> LatestSlot[PerceptionResult]:
         """A slot that gets every result from now on; a slow taker delays nobody. Close it to end."""
-        slot: LatestSlot[PerceptionResult] = LatestSlot()
-        with self._subscribers_lock:
-            self._subscribers.append(slot)
-        return slot
+        return self._subscribers.add()
 
     def status(self) -> ServiceStatus:
         """The service now."""
@@ -299,7 +295,4 @@ class Service:
     def _hand_out(self, result: PerceptionResult) -> None:
         if self._publisher is not None:
             self._publisher.offer(result)
-        with self._subscribers_lock:
-            self._subscribers = [slot for slot in self._subscribers if not slot.closed]
-            for slot in self._subscribers:
-                slot.put(result)
+        self._subscribers.put(result)

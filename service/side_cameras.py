@@ -23,6 +23,7 @@ from service.settings import ExtraCameraSettings, Settings
 from service.side_merge import SideMerge
 from service.side_watch import SideWatch
 from service.status import SideStatus
+from uavdepth.errors import UavDepthError
 
 log = structlog.get_logger()
 
@@ -115,6 +116,11 @@ class SideCameras:
             side.reader.stop()
         for thread in self._threads:
             thread.join(_JOIN_TIMEOUT_S)
+
+    @property
+    def failure(self) -> UavDepthError | None:
+        """Why one of them can never work as configured, or None."""
+        return next((side.reader.failure for side in self._sides if side.reader.failure), None)
 
     def added_to(self, result: PerceptionResult) -> PerceptionResult:
         """The main camera's result with what the sides see; itself where it is not trusted."""

@@ -22,7 +22,7 @@ from program_fakes import (
     wall_over_ground,
 )
 
-from service.cameras.camera import Camera
+from service.cameras.camera import Camera, PictureSizeError
 from service.cameras.reader import CameraState, CameraStatus
 from service.clock import MonotonicClock
 from service.errors import CameraError, ConfigError
@@ -295,6 +295,22 @@ def test_the_service_sends_and_records_what_all_cameras_see(
     pictures = list(flight.footage.pictures())
     assert {picture.camera for picture in pictures} == {"", "right"}
     assert all(picture.image_bgr is not None for picture in pictures)
+
+
+@pytest.mark.parametrize(("armed", "stops"), [(False, True), (True, False)])
+def test_a_side_of_another_size_stops_the_service_on_the_ground_and_never_in_the_air(
+    monkeypatch: pytest.MonkeyPatch, armed: bool, stops: bool
+) -> None:
+    monkeypatch.setattr("service.side_cameras.make_camera", lambda *_: endless([PictureSizeError("64x48")]))
+    link = FakeLink(MonotonicClock(), armed=armed)
+    blind = ScriptedCamera(SETTINGS, link.clock, [])
+    service = Service(SETTINGS, link=link, camera=blind, load_perception=lambda _settings: main_perception())
+    service.start()
+    try:
+        wait_until(lambda: service.status().sides[0].camera.state is CameraState.FAILED)
+        assert isinstance(service.failure, ConfigError) is stops
+    finally:
+        service.stop()
 
 
 # -- the configuration
