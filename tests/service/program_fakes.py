@@ -15,6 +15,7 @@ from itertools import count
 import numpy as np
 from numpy.typing import NDArray
 
+from service.autopilot.hold_request import HoldOutcome
 from service.autopilot.link_status import LinkStatus
 from service.autopilot.service_state import ServiceState
 from service.cameras.camera import Camera, CameraTimeoutError
@@ -124,7 +125,8 @@ class FakeLink:
     states: list[ServiceState] = field(default_factory=list)
     said: list[tuple[int, str]] = field(default_factory=list)
     closed: bool = False
-    holds: int = 0
+    mode: str | None = None
+    hold_outcome: HoldOutcome | None = None
 
     def start(self) -> None:
         return
@@ -151,7 +153,7 @@ class FakeLink:
         self.said.append((severity, text))
 
     def hold(self) -> str:
-        self.holds += 1
+        self.hold_outcome = HoldOutcome.ASKED
         return "BRAKE"
 
     def status(self) -> LinkStatus:
@@ -162,6 +164,8 @@ class FakeLink:
             system_id=1,
             rates_hz={"DISTANCE_SENSOR": self.rangefinder_hz},
             autopilot="ardupilot",
+            mode=self.mode,
+            hold=self.hold_outcome,
             sent_obstacles=len(self.sent),
         )
 

@@ -21,6 +21,7 @@ from program_fakes import (
     wall_over_ground,
 )
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from running_service import running, texts
 
 from service.autopilot.hold_request import HoldOutcome
 from service.cameras.reader import CameraState
@@ -276,6 +277,22 @@ def test_a_hovering_vehicle_is_held_once_when_it_sets_out_without_distances(stic
     flight.fly(10.0, stick)
     assert flight.controller.mode == "LOITER"
     assert len(flight.asked) == 1
+
+
+def test_the_pilot_reads_what_is_asked_for_and_that_it_was_refused() -> None:
+    settings = make_settings("autopilot.on_loss=hold")
+    camera = ScriptedCamera(settings, MonotonicClock(), [picture()] * 20 + [CameraError("unplugged")])
+    with running(settings=settings, camera=camera, mode="LOITER") as run:
+
+        def reads(text: str) -> bool:
+            """While the vehicle drifts north."""
+            north_m, east_m, down_m = run.link.position_ned_m or (0.0, 0.0, 0.0)
+            run.link.position_ned_m = (north_m + 0.01, east_m, down_m)
+            return text in texts(run.link)
+
+        wait_until(lambda: reads("uavdepth: asks for BRAKE"))
+        run.link.hold_outcome = HoldOutcome.REFUSED
+        wait_until(lambda: reads("uavdepth: hold refused, fly by hand"))
 
 
 @pytest.mark.parametrize("late_s", [0.1, 0.4, 0.7, 0.9])
