@@ -23,6 +23,13 @@ def points_of(
     return planes
 
 
+def fit(
+    predicted: NDArray[np.float32], planes: NDArray[np.float32], sigma: float = 0.5
+) -> NDArray[np.float32]:
+    """The fit of a network that is that sure of itself everywhere."""
+    return fit_to_points(predicted, np.full(predicted.shape, sigma, np.float32), planes)
+
+
 def scattered(count: int, seed: int = 0) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     rng = np.random.default_rng(seed)
     return rng.integers(0, HEIGHT, count), rng.integers(0, WIDTH, count)
@@ -30,19 +37,19 @@ def scattered(count: int, seed: int = 0) -> tuple[NDArray[np.intp], NDArray[np.i
 
 def test_without_points_the_prediction_stays() -> None:
     nothing = np.zeros((2, HEIGHT, WIDTH), np.float32)
-    np.testing.assert_array_equal(fit_to_points(TRUE_LOG_Q, nothing), TRUE_LOG_Q)
+    np.testing.assert_array_equal(fit(TRUE_LOG_Q, nothing), TRUE_LOG_Q)
 
 
 @pytest.mark.parametrize("factor", [0.6, 0.9, 1.5])
 def test_a_wrong_scale_is_mended_everywhere(factor: float) -> None:
     predicted = TRUE_LOG_Q + np.float32(np.log(factor))
-    fitted = fit_to_points(predicted, points_of(TRUE_LOG_Q, *scattered(100)))
+    fitted = fit(predicted, points_of(TRUE_LOG_Q, *scattered(100)))
     assert np.abs(fitted - TRUE_LOG_Q).max() < 0.15 * abs(np.log(factor))
 
 
 def test_an_error_that_changes_across_the_picture_is_mended() -> None:
     predicted = TRUE_LOG_Q + np.linspace(-0.3, 0.3, WIDTH, dtype=np.float32)
-    fitted = fit_to_points(predicted, points_of(TRUE_LOG_Q, *scattered(150)))
+    fitted = fit(predicted, points_of(TRUE_LOG_Q, *scattered(150)))
     assert np.mean(np.abs(fitted - TRUE_LOG_Q)) < 0.25 * np.mean(np.abs(predicted - TRUE_LOG_Q))
 
 
@@ -52,7 +59,7 @@ def test_what_stands_before_a_background_keeps_its_outline() -> None:
     predicted = truth.copy()
     predicted[30:70, 80:120] += 0.4
     row, column = scattered(200)
-    fitted = fit_to_points(predicted, points_of(truth, row, column))
+    fitted = fit(predicted, points_of(truth, row, column))
     assert np.abs(fitted - truth)[30:70, 80:120].max() < 0.08
     outside = np.ones(truth.shape, bool)
     outside[30:70, 80:120] = False
@@ -62,7 +69,7 @@ def test_what_stands_before_a_background_keeps_its_outline() -> None:
 def test_far_from_every_point_the_prediction_stays() -> None:
     predicted = TRUE_LOG_Q + np.float32(0.3)
     row, column = scattered(50)
-    fitted = fit_to_points(predicted, points_of(TRUE_LOG_Q, row, column // 16))
+    fitted = fit(predicted, points_of(TRUE_LOG_Q, row, column // 16))
     assert np.abs(fitted[:, -24:] - predicted[:, -24:]).max() < 1e-3
     assert np.abs(fitted[:, :12] - TRUE_LOG_Q[:, :12]).max() < 0.06
 
@@ -71,18 +78,32 @@ def test_one_wrong_point_among_many_right_ones_moves_little() -> None:
     row, column = scattered(120)
     truth = TRUE_LOG_Q.copy()
     truth[row[0], column[0]] += 1.5
-    fitted = fit_to_points(TRUE_LOG_Q, points_of(truth, row, column))
-    assert np.abs(fitted - TRUE_LOG_Q).max() < 0.2
+    fitted = fit(TRUE_LOG_Q, points_of(truth, row, column), sigma=0.15)
+    assert np.abs(fitted - TRUE_LOG_Q).max() < 0.1
     assert np.mean(np.abs(fitted - TRUE_LOG_Q)) < 0.02
 
 
 def test_points_that_are_not_sure_change_little() -> None:
     predicted = TRUE_LOG_Q + np.float32(0.3)
     row, column = np.array([48]), np.array([96])
-    sure = fit_to_points(predicted, points_of(TRUE_LOG_Q, row, column, 0.02))
-    unsure = fit_to_points(predicted, points_of(TRUE_LOG_Q, row, column, 0.5))
+    sure = fit(predicted, points_of(TRUE_LOG_Q, row, column, 0.02))
+    unsure = fit(predicted, points_of(TRUE_LOG_Q, row, column, 0.5))
     assert abs(sure[48, 96] - TRUE_LOG_Q[48, 96]) < 0.05
     assert abs(unsure[48, 96] - predicted[48, 96]) < 0.06
+
+
+def test_a_network_that_is_sure_gives_way_less() -> None:
+    predicted = TRUE_LOG_Q + np.float32(0.1)
+    planes = points_of(TRUE_LOG_Q, *scattered(60))
+    left = [float(np.abs(fit(predicted, planes, sigma) - TRUE_LOG_Q).mean()) for sigma in (0.03, 0.1, 0.4)]
+    assert left[2] < 0.02 < left[1] < 0.05 < left[0] < 0.1
+
+
+@pytest.mark.parametrize("unknown", [np.nan, np.inf])
+def test_unknown_doubt_is_doubt(unknown: float) -> None:
+    predicted = TRUE_LOG_Q + np.float32(0.3)
+    planes = points_of(TRUE_LOG_Q, *scattered(100))
+    np.testing.assert_allclose(fit(predicted, planes, unknown), fit(predicted, planes, 1.0))
 
 
 def test_what_is_not_finite_stays_so_and_spoils_nothing_else() -> None:
@@ -91,7 +112,7 @@ def test_what_is_not_finite_stays_so_and_spoils_nothing_else() -> None:
     predicted[8:10, :5] = -np.inf
     predicted[8:10, 5:10] = np.inf
     row, column = scattered(100)
-    fitted = fit_to_points(predicted, points_of(TRUE_LOG_Q, row, column))
+    fitted = fit(predicted, points_of(TRUE_LOG_Q, row, column))
     np.testing.assert_array_equal(np.isnan(fitted), np.isnan(predicted))
     np.testing.assert_array_equal(np.isinf(fitted), np.isinf(predicted))
     assert np.abs(fitted[12:] - TRUE_LOG_Q[12:]).max() < 0.05
@@ -100,5 +121,5 @@ def test_what_is_not_finite_stays_so_and_spoils_nothing_else() -> None:
 def test_a_prediction_that_spans_more_than_any_scene_is_fitted_where_its_points_are() -> None:
     predicted = np.linspace(-40, 40, HEIGHT * WIDTH, dtype=np.float32).reshape(HEIGHT, WIDTH)
     row, column = scattered(50)
-    fitted = fit_to_points(predicted, points_of(predicted.clip(-8, 8), row, column))
+    fitted = fit(predicted, points_of(predicted.clip(-8, 8), row, column))
     assert np.isfinite(fitted).all()

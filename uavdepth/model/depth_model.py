@@ -114,19 +114,18 @@ class DepthModel:
         outputs = self._session.run(self._output_names, inputs)
 
         values = self._rows_and_columns(outputs[0])
-        if self.card.output == "log_inverse_depth" and "points" in self.card.hints:
-            values = fit_to_points(values, inputs[self.card.points_name][0])
         if self.card.output == "affine_inverse_depth":
             values = np.where(np.isfinite(values), values, np.float32(np.nan))
             return DepthMap.from_affine(_to_pixels_of(camera, values))
-        depth = self._depth(values, camera.fx * width / camera.width)
         sigma = None
         if self.card.uncertainty:
             with np.errstate(over="ignore"):
                 sigma = np.exp(self._rows_and_columns(outputs[1]), dtype=np.float32)
-            sigma = _to_pixels_of(camera, sigma)
-        depth = _to_pixels_of(camera, depth)
+        if sigma is not None and self.card.output == "log_inverse_depth" and "points" in self.card.hints:
+            values = fit_to_points(values, sigma, inputs[self.card.points_name][0])
+        depth = _to_pixels_of(camera, self._depth(values, camera.fx * width / camera.width))
         if sigma is not None:
+            sigma = _to_pixels_of(camera, sigma)
             sigma[~np.isfinite(sigma) | np.isnan(depth)] = np.nan
         return DepthMap(depth, sigma)
 
