@@ -26,9 +26,6 @@ _GROUND_SIGMA = 0.1
 _GROUND_WORTH = 40.0
 """All of the ground is worth as much as so many points in tiles of their own."""
 
-_LARGEST_GROUND_SIGMA = 0.25
-"""Ground that tells the factor no better tells no shape: the fit makes a ground of most that is seen."""
-
 _FARTHEST_SHARE = 0.05
 
 
@@ -55,7 +52,7 @@ class AffineFit:
         """Forget everything."""
         self.shape: AffineShape | None = None
         self.ground: GroundScale | None = None
-        """What the ground says of the last picture's fitted depth; None where it is not seen."""
+        """What the ground says of the last picture's fitted depth; None where it is not surely seen."""
 
     def update(
         self,
@@ -83,7 +80,8 @@ class AffineFit:
             samples = by_points.with_more(self._ground_samples(values, ground))
         self.shape = fit_affine(samples, before, passed_s)
         self.ground = self._ground_scale(values, ground)
-        if ground is not None and not self._is_sure_of_ground:
+        if ground is not None and self.ground is None:
+            # It tells no shape either: the fit makes a ground of most that is seen.
             self.shape = fit_affine(by_points, before, passed_s)
             self.ground = self._ground_scale(values, ground)
         if before is None or self.shape is None:
@@ -103,10 +101,6 @@ class AffineFit:
         with np.errstate(divide="ignore", over="ignore"):
             return np.asarray(1 / np.maximum(inverse, np.float32(0.0)))
 
-    @property
-    def _is_sure_of_ground(self) -> bool:
-        return self.ground is not None and self.ground.relative_sigma <= _LARGEST_GROUND_SIGMA
-
     def _ground_scale(self, values: NDArray[np.float32], ground: GroundHint | None) -> GroundScale | None:
         if self.shape is None or ground is None:
             return None
@@ -114,7 +108,8 @@ class AffineFit:
         if found is None:
             return None
         sigma = math.hypot(found.relative_sigma, self._beyond_infinity(values, self.shape))
-        return replace(found, relative_sigma=sigma)
+        found = replace(found, relative_sigma=sigma)
+        return found if found.is_sure else None
 
     def _beyond_infinity(self, values: NDArray[np.float32], shape: AffineShape) -> float:
         """By how much of the pivot's inverse depth the shift is too small at least: ground that rises ahead

@@ -152,7 +152,9 @@ class ScaleEstimator:
             by_ground = None
             if ground is not None:
                 by_ground = self._scaler.estimate(depth.depth_m, ground.attitude, ground.height_m)
-            self._listen(depth.depth_m, by_ground, points, passed_s)
+            # What is doubtful is left out: the filter takes the doubt of one source for lasting.
+            sure = by_ground if by_ground is not None and by_ground.is_sure else None
+            self._listen(depth.depth_m, sure, points, passed_s)
             return self._estimate()
         values = depth.affine_inverse_depth
         if values is None:

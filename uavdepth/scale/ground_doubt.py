@@ -14,7 +14,7 @@ _NEAREST_SHARE = 0.25
 """Of the pixels that look down, those whose ground is nearest: it is next to the ground below the vehicle,
 whose height is known."""
 
-_RAISED_GROUND = 0.1
+_RAISED_GROUND = 0.08
 """How likely what stands there in front of the supposed ground is the ground itself, and the supposed one a
 valley's floor; most often it is an obstacle."""
 

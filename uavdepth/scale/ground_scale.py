@@ -49,6 +49,7 @@ _RIVAL = 0.7
 _RIVAL_DISTANCE = 0.3
 """A second peak of this share of the first, this far away in logs, makes the answer ambiguous."""
 
+_LARGEST_SIGMA = 0.25
 _LARGEST_SPREAD = 0.2
 _SLOPES = (0.65, 1.4)
 """Of log depth over log of the plane's depth. Level ground has 1, a wall 0; ground that falls or rises
@@ -71,6 +72,11 @@ class GroundScale:
     factor: float
     relative_sigma: float
     pixels: int
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether it may be followed: beyond a quarter of doubt most likely not the ground is seen."""
+        return self.relative_sigma <= _LARGEST_SIGMA
 
 
 def vertical_height_m(range_m: float, attitude: Attitude) -> float:
@@ -174,7 +180,10 @@ class GroundScaler:
         spread, tiles = _spread(log_ratio - np.float32(log_factor), tile)
         if tiles < _MIN_TILES or spread > _LARGEST_SPREAD:
             return None
-        surface = doubt_of_surface(seen_plane, seen_ratio - np.float32(log_factor), _GATE, endless)
+        # Ground that falls lies beneath level ground far off, and is no other surface.
+        fallen = np.float32(slope - 1.0) * (seen_plane - log_plane.mean())
+        off = seen_ratio - np.float32(log_factor) + fallen
+        surface = doubt_of_surface(seen_plane, off, _GATE, endless)
         sigma = math.hypot(_FLOOR_SIGMA, spread, doubt_of_slope(slope, reach, spread, tiles), surface)
         return GroundScale(math.exp(log_factor), sigma, int(log_ratio.size))
 
