@@ -118,7 +118,7 @@ class SlopingGround:
     ) -> tuple[NDArray[np.int64], NDArray[np.intp]]:
         """(rows, cells, levels) how many points, and (rows,) which elements hold any."""
         per_level = _LEVELS / ((_HIGHEST - _LOWEST) * height_m)
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", over="ignore"):
             level = (height_m * (1 - _LOWEST) - points[2]) * np.float32(per_level)
             wanted = (level >= 0) & (level < _LEVELS)
             wanted &= (range_m >= _NEAREST_M) & (range_m < self._max_distance_m)
