@@ -15,8 +15,9 @@ if TYPE_CHECKING:
     from service.demo.flight import DemoFlight
     from service.demo.report import DemoReport
 
-DEFAULT_SCENE = "city:1003"
-"""Seeds from 1000 on are kept from training (`training.data.split`)."""
+DEFAULT_SCENE = "city:1001"
+"""The first city kept from training (`training.data.split`: seeds from 1000 on) whose street is wider than
+the margin all the way. In 1003 a house 3.8 m beside the way is nearer, and ArduPilot rests there now and then."""
 
 _REFRESH_S = 0.2
 _PICTURE_NEAR_M, _PICTURE_FAR_M = 1.5, 50.0

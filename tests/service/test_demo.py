@@ -17,10 +17,18 @@ import numpy as np
 import pytest
 
 from service.clock import MonotonicClock
+from service.demo.command import DEFAULT_SCENE
 from service.demo.flight import nearest_ahead_m
 from service.demo.observer import GroundObserver
 from service.demo.picture import draw_side_by_side
-from service.demo.plan import DemoPlan, free_zenoh_endpoint, write_configuration
+from service.demo.plan import (
+    ABOVE_M,
+    BELOW_M,
+    MARGIN_M,
+    DemoPlan,
+    free_zenoh_endpoint,
+    write_configuration,
+)
 from service.demo.radar import CLEAR_BGR, OBSTACLE_BGR, draw_radar
 from service.demo.report import DemoReport, Latency
 from service.demo.truth import true_distance_ahead_m
@@ -32,6 +40,7 @@ from service.settings.load import load_settings
 from uavdepth.camera import CameraModel
 from uavdepth.depth.codec import encode_depth_png
 from uavdepth.scan.obstacle_scan import ObstacleScan, SectorState, sector_bearings_deg
+from uavdepth.scenes import Scene, load_scene, parse_scene
 
 PLAN = DemoPlan("wall:1000", "ardupilot", False, 3.0, 3.0, 30.0, "default")
 REPORT = DemoReport(
@@ -123,6 +132,33 @@ class TestTruth:
 
     def test_with_the_back_to_the_wall_there_is_nothing(self) -> None:
         assert true_distance_ahead_m(FlatWall(30.0), (20.0, 0.0, -3.0), math.pi, 2.0, 1.5) is None
+
+
+class TestDefaultScene:
+    """ArduPilot keeps its margin to both sides too, and rests beside what is nearer."""
+
+    @pytest.fixture(autouse=True)
+    def rendered_worlds(self) -> None:
+        pytest.importorskip("embreex", reason="rendered worlds need the extra sim")
+
+    def nearest_aside_m(self, scene: Scene, north_m: float) -> float:
+        """Within 20 to 100 degrees of the nose."""
+        found = [
+            true_distance_ahead_m(scene, (north_m, 0.0, -3.0), math.radians(bearing), BELOW_M, ABOVE_M)
+            for bearing in (-80.0, -40.0, 40.0, 80.0)
+        ]
+        return min(distance for distance in found if distance is not None)
+
+    def test_its_street_is_wider_than_the_margin_up_to_the_facade(self) -> None:
+        city = load_scene(*parse_scene(DEFAULT_SCENE))
+        facade_m = true_distance_ahead_m(city, (0.0, 0.0, -3.0), 0.0, BELOW_M, ABOVE_M)
+        assert facade_m is not None
+        assert facade_m > 20.0
+        for north_m in np.arange(0.0, facade_m - 3.0 * MARGIN_M, 2.0):
+            assert self.nearest_aside_m(city, float(north_m)) > 1.5 * MARGIN_M
+
+    def test_the_measure_tells_a_narrow_street(self) -> None:
+        assert self.nearest_aside_m(load_scene("city", 1003), 5.5) < 1.5 * MARGIN_M
 
 
 class TestVerdict:
