@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 DEFAULT_SCENE = "city:1001"
 """The first city kept from training (`training.data.split`: seeds from 1000 on) whose street is wider than
-the margin all the way. In 1003 a house 3.8 m beside the way is nearer, and ArduPilot rests there now and then."""
+the margin all the way. In 1003 a house 3.8 m beside the way is nearer, and ArduPilot may rest there."""
 
 _REFRESH_S = 0.2
 _PICTURE_NEAR_M, _PICTURE_FAR_M = 1.5, 50.0
