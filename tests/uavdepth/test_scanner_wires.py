@@ -63,7 +63,7 @@ class TestWires:
 class TestCaution:
     def test_an_obstacle_is_told_nearer_by_its_doubt(self, camera, mount, level):
         depth = depth_of([wall(8)], camera, mount, level)
-        for factor, sigma in ((1.0, 0.1), (2.0, 0.1), (1.0, 0.3), (0.0, 0.3)):
+        for factor, sigma in ((1.0, 0.1), (2.0, 0.1), (0.5, 0.3), (0.0, 0.3)):
             scan = ObstacleScanner(camera, mount, sigma_factor=factor).scan(
                 depth, level, None, np.full(depth.shape, sigma, np.float32)
             )
@@ -74,17 +74,30 @@ class TestCaution:
         depth = depth_of([pole(0, 4.0, 0.1), wall(15)], camera, mount, level)
         scan = ObstacleScanner(camera, mount).scan(depth, level, None, np.full(depth.shape, sigma))
         assert scan.state[element(0)] == OBSTACLE
-        assert scan.distance_m[element(0)] == pytest.approx(0.6 * 4.0, rel=0.05)
+        assert scan.distance_m[element(0)] == pytest.approx(0.75 * 4.0, rel=0.05)
 
     @pytest.mark.parametrize("sigma", [0.05, 0.3])
     def test_far_and_certain_is_clear(self, camera, mount, level, sigma):
         scan = ObstacleScanner(camera, mount).scan(*self.far_wall(camera, mount, level, sigma))
         assert scan.state[element(0)] == CLEAR  # 30 m, and 21 m at the least
 
-    def test_far_but_perhaps_within_reach_is_told_where_it_may_begin(self, camera, mount, level):
-        scan = ObstacleScanner(camera, mount).scan(*self.far_wall(camera, mount, level, 0.4))
+    @pytest.mark.parametrize("factor", [0.5, 1.2, 2.0])
+    def test_far_but_perhaps_within_reach_is_told_just_within_it(self, camera, mount, level, factor):
+        scanner = ObstacleScanner(camera, mount, sigma_factor=factor)
+        scan = scanner.scan(*self.far_wall(camera, mount, level, 0.4))
         assert scan.state[element(0)] == OBSTACLE
-        assert scan.distance_m[element(0)] == pytest.approx(18.0, rel=0.03)
+        assert scan.distance_m[element(0)] == pytest.approx(19.98, rel=1e-3)
+
+    def test_a_little_beyond_is_told_where_it_may_begin(self, camera, mount, level):
+        depth = depth_of([wall(21)], camera, mount, level)
+        scan = ObstacleScanner(camera, mount).scan(depth, level, None, np.full(depth.shape, 0.4))
+        assert scan.distance_m[element(0)] == pytest.approx(0.8 * 21.0, rel=0.03)
+
+    def test_a_way_is_freed_by_twice_the_doubt_that_shortens(self, camera, mount, level):
+        for factor, sigma, state in ((0.5, 0.3, CLEAR), (0.5, 0.36, OBSTACLE), (0.25, 0.5, CLEAR)):
+            scanner = ObstacleScanner(camera, mount, sigma_factor=factor)
+            scan = scanner.scan(*self.far_wall(camera, mount, level, sigma))
+            assert scan.state[element(0)] == state
 
     @pytest.mark.parametrize("sigma", [0.51, 1.0, 3.0, np.inf, np.nan])
     def test_far_and_too_doubtful_to_tell_is_unknown(self, camera, mount, level, sigma):

@@ -27,6 +27,9 @@ FREE_SHARE = 0.7
 """Share of the band's height that must be seen free before an element is clear. The flight level
 itself is then always among what is seen: of the default band it lies at 43 % from the top."""
 
+_LAST_SHARE = 0.999
+"""Of maximum distance: the farthest that an obstacle is told at."""
+
 _GROUND_STRIDE = 4
 _SLOPE_ROWS, _SLOPE_COLUMNS = 2, 8
 _CHUNK = 32768
@@ -57,12 +60,13 @@ class ObstacleScanner:
     - UNKNOWN else: outside the picture, partly outside, masked, unknown depth, depth that may end short
       of what makes it clear, or tilted away from the flight level.
 
-    Depth d with a relative standard deviation sigma may be as near as d * (1 - sigma_factor * sigma). That is
-    what a clear pixel must reach the ground or maximum distance with, and where an obstacle is told, but for
-    `LARGEST_SHORTENING`. So a surface beyond maximum distance that may well begin within it is told where it
-    may begin: "unknown" would keep PX4 from moving at all. Whether something is ground or lies in the height
-    band is for d itself to say. Depth more doubtful than `max_relative_sigma` frees nothing: it is unknown
-    when far, and an obstacle when near, because to ArduPilot unknown is as open as clear.
+    An obstacle at depth d with a relative standard deviation sigma is told at d * (1 - sigma_factor * sigma),
+    but for `LARGEST_SHORTENING`; a pixel is clear where depth shortened by `FREEING_FACTOR` as much still
+    reaches the ground or maximum distance. A surface beyond maximum distance that may so begin within it is
+    told where it begins by the first, or just within maximum distance: "unknown" would keep PX4 from moving
+    at all. Whether something is ground or lies in the height band is for d itself to say. Depth more doubtful
+    than `max_relative_sigma` frees nothing: it is unknown when far, and an obstacle when near, because to
+    ArduPilot unknown is as open as clear.
 
     Args:
         camera, mount: the camera and how it sits on the vehicle.
@@ -98,7 +102,7 @@ class ObstacleScanner:
         above_m: float = 1.5,
         min_pixels: int | None = None,
         ground_tolerance: float = GROUND_DEPTH_SHARE,
-        sigma_factor: float = 1.0,
+        sigma_factor: float = 0.5,
         mask: NDArray[np.bool_] | None = None,
         max_ground_slope_deg: float = 15.0,
         max_relative_sigma: float = 0.5,
@@ -133,8 +137,7 @@ class ObstacleScanner:
         self._slope_rays = np.ascontiguousarray(rays[:, 1::_SLOPE_ROWS, 4::_SLOPE_COLUMNS]).reshape(3, -1)
         self._sloping = SlopingGround(max_ground_slope_deg, max_distance_m, ground_tolerance)
         self._view = BandView(camera, mount, max_distance_m, below_m, above_m)
-        farthest_m = max_distance_m / (1 - self._caution.largest_shortening)
-        self._histogram = RangeHistogram(farthest_m, self._joined_rays.shape[1])
+        self._histogram = RangeHistogram(self._caution.farthest_m(max_distance_m), self._joined_rays.shape[1])
         if min_pixels is None:
             min_pixels = smallest_thing(camera, max_distance_m)
         self._needed = pixels_of_thing(camera, self._histogram.edges_m, min_pixels, self._together)
@@ -216,8 +219,8 @@ class ObstacleScanner:
             if obstacle.any():
                 self._histogram.add(points[0], points[1], range_m, obstacle, shortening)
         distance = self._histogram.nearest_m(self._needed, self._line_needed)
-        # On the mean of its points it may lie beyond after all; as none of them is clear, it is unknown then.
-        distance[distance >= self.max_distance_m] = np.nan
+        # What may begin within maximum distance is told there, also where its most likely place is beyond.
+        np.minimum(distance, np.float32(_LAST_SHARE * self.max_distance_m), out=distance)
         return distance
 
     def _seen_free(
