@@ -102,6 +102,25 @@ class TestThings:
         assert element(0) in obstacles(scan)
         assert scan.distance_m[element(0)] == pytest.approx(5.0, rel=0.03)
 
+    @pytest.mark.parametrize("right_m", [-1.5, 0.0, 1.5])
+    def test_a_car_whose_foot_is_not_seen_is_no_slope(self, camera, nose_down, level, right_m):
+        """Bonnet, windscreen and roof from 0.9 to 1.4 m: as a slope of 15 degrees would rise."""
+        height, left, right = 2.65, right_m - 0.95, right_m + 0.95
+        parts = [(2.6, 3.7, 0.9), (3.7, 3.95, 1.05), (3.95, 4.2, 1.25), (4.2, 6.0, 1.4)]
+        car = [box((near, left, height - tall), (far, right, height)) for near, far, tall in parts]
+        depth = depth_of([ground(height), *car], camera, nose_down, level)
+        scan = ObstacleScanner(camera, nose_down).scan(depth, level, height)
+        ahead = element(math.degrees(math.atan2(right_m, 3.7)))
+        assert scan.state[ahead] == SectorState.OBSTACLE
+        assert scan.distance_m[ahead] < 4.2
+
+    def test_a_hillside_beside_a_gorge_is_ground(self, camera, nose_down, level):
+        hill, gorge = slope(3.0, 10), ground(9.0)
+        left, gone = (depth_of([thing], camera, nose_down, level) for thing in (hill, gorge))
+        depth = np.where(np.arange(camera.width) < camera.width // 2, left, gone)
+        scan = ObstacleScanner(camera, nose_down).scan(depth, level, 3.0)
+        assert scan.nearest_m == pytest.approx(too_near_m(3.0, 10), rel=0.12)
+
     def test_a_kerb_that_stands_in_the_band_is_an_obstacle_from_low_down(self, camera, nose_down, level):
         kerb = box((3, -5, 0.65), (3.3, 5, 1.0))  # 35 cm, seen from 1 m
         depth = depth_of([ground(1.0), kerb], camera, nose_down, level)

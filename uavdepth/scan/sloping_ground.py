@@ -69,7 +69,9 @@ class SlopingGround:
     Points are gathered by element and range. Ground goes on from one range to the next where points lie that
     rise over none of the ground before, the vehicle's foot included, by more than the slope allows. A wall, a
     car or a box rises at once, and what hangs in the air has the ground below it. A surface is believed if it
-    reaches from near to far, and, where its beginning is not seen, if it does not come from above the foot.
+    reaches from near to far, if no ground beside it lies lower by more than the slope allows, and, where its
+    beginning is not seen, if it does not come from above the foot: bonnet, windscreen and roof of a parked
+    car rise like a slope, but the road beside it does not.
 
     Args:
         max_slope_deg: steepest ground.
@@ -108,6 +110,7 @@ class SlopingGround:
         if not rows.size:
             return None
         rise = self._followed(count, height_m)
+        self._drop_sheer_sides(rise, rows, height_m)
         self._believe(rise, height_m)
         deepest = self._limits(rise, rows, ground)
         shallowest = float(deepest.min())
@@ -148,6 +151,18 @@ class SlopingGround:
         start = np.hstack([np.zeros((len(rise), 1)), start[:, :-1]])
         rise[rise > start + climb + noise] = np.nan
         return np.minimum(rise, start + climb)
+
+    def _drop_sheer_sides(self, rise: NDArray[np.float64], rows: NDArray[np.intp], height_m: float) -> None:
+        """Take out, in place, what stands higher over the ground beside it than the steepest slope leads.
+
+        Ground that falls away beside is no reason: it counts as level.
+        """
+        apart = np.abs(rows[:, None] - rows)
+        angle = np.radians(SECTOR_WIDTH_DEG) * np.minimum(apart, SECTOR_COUNT - apart)
+        chord = 2.0 * np.sin(0.5 * angle)
+        beside = np.where(np.isnan(rise), np.inf, np.maximum(rise, 0.0))
+        led_m = (beside + self._slope * chord[:, :, None] * self._range_m).min(axis=1)
+        rise[rise > led_m + _NOISE_FLOOR_M + _NOISE_SHARE * height_m] = np.nan
 
     def _believe(self, rise: NDArray[np.float64], height_m: float) -> None:
         """Take out, in place, surfaces that are too short, and first ones that come from above the foot."""
