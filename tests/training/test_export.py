@@ -30,6 +30,7 @@ from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
 from uavdepth.model.depth_model import DepthModel
 from uavdepth.model.hints import GroundHint, Hints, PointHints
+from uavdepth.model.point_fit import fit_to_points
 
 SIZE = (128, 64)
 """Another than that of the run: every size comes from one checkpoint."""
@@ -84,7 +85,7 @@ def some_hints(camera: CameraModel) -> Hints:
 
 
 @pytest.mark.parametrize("hinted", [False, True])
-def test_flight_gives_the_depth_that_training_meant_and_sigma_times_the_calibrations_factor(
+def test_flight_draws_the_depth_that_training_meant_to_the_points_and_scales_sigma_as_calibrated(
     checkpoint: Checkpoint, exported: Path, hinted: bool
 ) -> None:
     camera = CameraModel.from_fov(*SIZE, 75.0)
@@ -94,14 +95,15 @@ def test_flight_gives_the_depth_that_training_meant_and_sigma_times_the_calibrat
     planes = (network_image(picture), *hint_maps(hints, view, *SIZE))
     with torch.no_grad():
         output = checkpoint.averaged_network()(*(torch.from_numpy(plane)[None] for plane in planes))
-    wanted = depth_from_output(output.log_inverse_depth[0, 0].numpy(), camera.fx)
+    sigma = SIGMA_FACTOR * np.exp(output.log_sigma[0, 0].numpy())
+    drawn = fit_to_points(output.log_inverse_depth[0, 0].numpy(), sigma, planes[2])
+    wanted = depth_from_output(drawn, camera.fx)
     answer = DepthModel.load(exported, provider="cpu").infer(picture, camera, hints)
     known = np.isfinite(answer.depth_m) & (wanted < MAX_DEPTH_M)
     assert known.any()
     # The checkpoint is in single precision, the file in half.
     assert np.abs(np.log(answer.depth_m[known] / wanted[known])).mean() < 2e-3
     assert answer.relative_sigma is not None
-    sigma = SIGMA_FACTOR * np.exp(output.log_sigma[0, 0].numpy())
     assert np.allclose(answer.relative_sigma[known], sigma[known], rtol=1e-2)
 
 

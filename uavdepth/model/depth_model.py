@@ -17,6 +17,7 @@ from uavdepth.model.hint_planes import ground_plane, point_planes
 from uavdepth.model.hints import Hints
 from uavdepth.model.inference import InferenceSession, open_session
 from uavdepth.model.network_file import WEIGHTS_FOLDER, find_network, network_problems, read_card
+from uavdepth.model.point_fit import fit_to_points
 
 __all__ = ["WEIGHTS_FOLDER", "DepthModel"]
 
@@ -98,7 +99,8 @@ class DepthModel:
             image_bgr: (H, W, 3) uint8 picture of this camera, not undistorted.
             camera: the camera, in the pixels of the picture.
             hints: what the vehicle knows. Those that the network does not take are left out, and it
-                works without those that are not given.
+                works without those that are not given. The answer of one that takes points is drawn to
+                them (`uavdepth.model.point_fit`).
 
         Raises:
             ImageSizeError: the picture's size is not the camera's, or it is not an 8-bit BGR picture.
@@ -119,6 +121,8 @@ class DepthModel:
         if self.card.uncertainty:
             with np.errstate(over="ignore"):
                 sigma = np.exp(self._rows_and_columns(outputs[1]), dtype=np.float32)
+        if sigma is not None and self.card.output == "log_inverse_depth" and "points" in self.card.hints:
+            values = fit_to_points(values, sigma, inputs[self.card.points_name][0])
         depth = _to_pixels_of(camera, self._depth(values, camera.fx * width / camera.width))
         if sigma is not None:
             sigma = _to_pixels_of(camera, sigma)
