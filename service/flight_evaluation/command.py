@@ -43,6 +43,10 @@ def evaluate_flight(
     latency_ms: Annotated[
         float, typer.Option(min=0.0, max=290.0, help="From exposure to the message's leaving.")
     ] = 100.0,
+    sigma_factor: Annotated[
+        float | None,
+        typer.Option(min=0.0, max=5.0, help="As `[scan] sigma_factor`; its default if left out."),
+    ] = None,
     plots: Annotated[Path | None, typer.Option(help="Folder for plots (needs matplotlib).")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
@@ -70,7 +74,12 @@ def evaluate_flight(
             raise ConfigError(f"--scenes: no scene is called {name!r}; there are {', '.join(KNOWN_SCENES)}")
     kinds = (DepthKind.TRUE, DepthKind.NETWORK) if depth is DepthChoice.BOTH else (DepthKind(depth.value),)
     plan = EvaluationPlan(
-        scenes=tuple(dict.fromkeys(names)), kinds=kinds, model=model, latency_s=latency_ms / 1000.0, seed=seed
+        scenes=tuple(dict.fromkeys(names)),
+        kinds=kinds,
+        model=model,
+        latency_s=latency_ms / 1000.0,
+        seed=seed,
+        sigma_factor=sigma_factor,
     )
     plan = quickly(plan) if quick else plan
     plan = plan.changed(approaches=approaches, corridors=corridors, poses=poses)

@@ -18,8 +18,9 @@ _ARMING: dict[Flavor, dict[str, float]] = {
 BAND = HeightBand(BELOW_M, ABOVE_M)
 
 
-def settings_for(model: str) -> Settings:
-    """The configuration that all figures are of, with one network."""
+def settings_for(model: str, sigma_factor: float | None = None) -> Settings:
+    """The configuration that all figures are of, with one network; `sigma_factor` None: the default."""
+    caution = {} if sigma_factor is None else {"sigma_factor": sigma_factor}
     return Settings.model_validate(
         {
             "camera": {
@@ -31,7 +32,7 @@ def settings_for(model: str) -> Settings:
             },
             "mount": {"pitch_deg": -10.0, "forward_m": 0.1},
             "model": {"path": model, "threads": 1},
-            "scan": {"below_m": BELOW_M, "above_m": ABOVE_M},
+            "scan": {"below_m": BELOW_M, "above_m": ABOVE_M, **caution},
         }
     )
 

@@ -71,7 +71,7 @@ class Evaluation:
 
     def __init__(self, plan: EvaluationPlan) -> None:
         self.plan = plan
-        self.settings: Settings = settings_for(plan.model)
+        self.settings: Settings = settings_for(plan.model, plan.sigma_factor)
         self.evidence = {kind: {name: Evidence(name, kind) for name in plan.scenes} for kind in plan.kinds}
         if DepthKind.NETWORK in plan.kinds:
             Eyes(self.settings, DepthKind.NETWORK)  # a wrong network is told at once, not after minutes

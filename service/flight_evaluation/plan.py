@@ -25,6 +25,7 @@ class EvaluationPlan:
             by them in turns.
         turns: flights a scene in which bearings are measured.
         worlds: worlds of each scene: as drawn, under a low sun, in haze.
+        sigma_factor: `[scan] sigma_factor`; None: its default.
     """
 
     scenes: tuple[str, ...] = DEFAULT_SCENES
@@ -39,6 +40,7 @@ class EvaluationPlan:
     corridors: int = 20
     turns: int = 2
     worlds: int = 3
+    sigma_factor: float | None = None
 
     def changed(
         self, approaches: int | None = None, corridors: int | None = None, poses: int | None = None

@@ -43,6 +43,7 @@ def report(evaluation: Evaluation, machine: str, date: str, model: str) -> dict[
         "date": date,
         "model": model,
         "latency_ms": round(1000 * plan.latency_s),
+        "sigma_factor": evaluation.settings.scan.sigma_factor,
         "picture": f"{camera.width}x{camera.height}",
         "frames_per_s": camera.fps,
         "speed_of_approaches_mps": 3.0,

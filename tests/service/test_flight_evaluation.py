@@ -190,11 +190,13 @@ class TestCommand:
         assert "nowhere.onnx" in capsys.readouterr().err
 
     def test_it_flies_and_prints_json_alone(self, capsys: pytest.CaptureFixture[str]) -> None:
-        words = ["--depth", "true", "--scenes", "wires", "--quick"]
+        words = ["--depth", "true", "--scenes", "wires", "--quick", "--sigma-factor", "1.5"]
         with pytest.raises(SystemExit) as end:
             main(["evaluate-flight", *words, "--approaches", "0", "--corridors", "0", "--json"])
         assert end.value.code == 0
-        wires = json.loads(capsys.readouterr().out)["scenes"]["wires"]
+        told = json.loads(capsys.readouterr().out)
+        assert told["sigma_factor"] == 1.5
+        wires = told["scenes"]["wires"]
         assert wires["depth"] == "true"
         assert wires["pictures"] > 10
         assert wires["missed_rate"] == 0.0
