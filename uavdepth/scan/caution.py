@@ -11,10 +11,9 @@ LARGEST_SHORTENING = 0.25
 """However doubtful a distance, at most so much of it is taken off: an obstacle at no distance at all would
 stop the vehicle for good."""
 
-FREEING_FACTOR = 2.0
-"""A way is freed by twice the standard deviations that distances are shortened by. What is nearest in an
-element has erred towards the vehicle already: shortened by one deviation it was told 24 % too near in the
-median, with the network that ships, and by half a deviation 14 % (docs/flight-evaluation.md)."""
+FREEING_FACTOR = 1.5
+"""A way is freed by so many times the standard deviations that distances are shortened by: what is nearest in
+an element has erred towards the vehicle already, what is taken for free has not (docs/flight-evaluation.md)."""
 
 _FARTHEST_REACH = 0.4
 """A surface beyond maximum distance is told where at most so much of its distance is doubtful."""
