@@ -13,7 +13,8 @@ stop the vehicle for good."""
 
 FREEING_FACTOR = 1.5
 """A way is freed by so many times the standard deviations that distances are shortened by: what is nearest in
-an element has erred towards the vehicle already, what is taken for free has not (docs/flight-evaluation.md)."""
+an element has erred towards the vehicle already, what is taken for free has not (docs/flight-evaluation.md).
+"""
 
 _FARTHEST_REACH = 0.4
 """A surface beyond maximum distance is told where at most so much of its distance is doubtful."""
