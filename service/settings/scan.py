@@ -43,7 +43,7 @@ class ScanSettings(Section):
         description="Obstacles count up to so far above the vehicle's flight level.",
     )
     sigma_factor: float = Field(
-        default=0.75,
+        default=1.0,
         ge=0.0,
         le=5.0,
         title="Caution about distances, standard deviations",
