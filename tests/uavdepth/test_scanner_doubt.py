@@ -38,7 +38,7 @@ class TestDoubt:
         depth = depth_of([pole(bearing, 6.0, 0.05)], camera, rear, level)
         scan = ObstacleScanner(camera, rear).scan(depth, level, None, np.full_like(depth, 0.25))
         assert obstacles(scan) == [element(180)]
-        assert scan.distance_m[element(180)] == pytest.approx(0.8125 * 6.0, rel=0.03)
+        assert scan.distance_m[element(180)] == pytest.approx(0.75 * 6.0, rel=0.03)
 
     def test_r7_unknown_depth_is_unknown(self, camera, mount, level):
         scan = ObstacleScanner(camera, mount).scan(np.full((320, 640), np.nan, np.float32), level, 5.0)
