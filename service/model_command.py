@@ -44,6 +44,7 @@ def check(
     ] = None,
     provider: Annotated[str, typer.Option(help="auto, tensorrt, cuda, openvino or cpu.")] = "auto",
     threads: Annotated[int | None, typer.Option(min=1, help="Threads of the network.")] = None,
+    precision: Annotated[str, typer.Option(help="auto, float, or int8 for the 8-bit file.")] = "auto",
 ) -> None:
     """Say what is wrong with a network or its card, or what it is and how fast it answers.
 
@@ -54,7 +55,7 @@ def check(
         # Which provider it fell back to stands in the summary.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ProviderFallbackWarning)
-            inference = open_session(path, provider, threads)
+            inference = open_session(path, provider, threads, precision)
     except ModelFileError as error:
         _end_with([Problem(str(error), "give an ONNX file that this version of ONNX Runtime can load")])
     try:

@@ -31,12 +31,19 @@ def load_network(settings: Settings) -> DepthModel:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ProviderFallbackWarning)
-            model = DepthModel.load(wanted.path, wanted.provider, wanted.threads, wanted.card)
+            model = DepthModel.load(
+                wanted.path, wanted.provider, wanted.threads, wanted.card, wanted.precision
+            )
     except (ModelFileError, ModelCardError) as error:
         raise ConfigError(f"[model] path: {error}") from error
     log.info("network", name=model.card.name, provider=model.provider, precision=model.precision)
     if model.fallback_reason is not None:
-        log.warning("network runs on a slower provider", provider=model.provider, why=model.fallback_reason)
+        log.warning(
+            "network runs slower than it could",
+            provider=model.provider,
+            precision=model.precision,
+            why=model.fallback_reason,
+        )
     return model
 
 

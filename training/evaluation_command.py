@@ -59,6 +59,7 @@ def evaluate(
     ] = None,
     provider: Annotated[str, typer.Option(help="What runs the network: auto, cpu, openvino, ...")] = "auto",
     threads: Annotated[int | None, typer.Option(min=1, help="Threads for inference.")] = None,
+    precision: Annotated[str, typer.Option(help="auto, float, or int8 for the 8-bit file.")] = "auto",
     as_json: Annotated[
         str | None, typer.Option("--json", help="File for the result as one JSON object; - prints it.")
     ] = None,
@@ -81,11 +82,13 @@ def evaluate(
     counts = parse_points(points or (_DEFAULT_POINTS if kitti is None else _DEFAULT_KITTI_POINTS))
     if kitti is None:
         plan = _plan(scenes, seeds, frames_per_seed, data)
-        result = evaluate_rendered(DepthModel.load(model, provider, threads), plan, counts)
+        network = DepthModel.load(model, provider, threads, precision=precision)
+        result = evaluate_rendered(network, plan, counts)
     else:
         if any(option is not None for option in (scenes, seeds, frames_per_seed, data)):
             raise EvaluationError("--kitti has no scenes, seeds or rendered frames: give one or the other")
-        result = evaluate_kitti(DepthModel.load(model, provider, threads), kitti, counts, every)
+        network = DepthModel.load(model, provider, threads, precision=precision)
+        result = evaluate_kitti(network, kitti, counts, every)
     if sheet is not None:
         write_sheet(sheet, result.rows)
     if as_json is not None:
@@ -132,7 +135,8 @@ def _print_tables(report: EvaluationReport) -> None:
     from training.evaluation_tables import tables
 
     console = Console(width=None if sys.stdout.isatty() else _TABLE_WIDTH)
-    console.print(f"{report.model} on {report.provider}: {report.data}", highlight=False)
+    what = f"{report.model} on {report.provider} in {report.precision}"
+    console.print(f"{what}: {report.data}", highlight=False)
     for table in tables(report):
         console.print(table)
     for name in report.skipped:

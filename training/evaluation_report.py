@@ -21,7 +21,7 @@ class EvaluationReport:
     """Errors of one network.
 
     Args:
-        model, provider: what was measured and what ran it.
+        model, provider, precision: what was measured, what ran it, and in which number format.
         hints: that the network takes.
         data: what it was measured on, as a sentence.
         details: what else tells which frames they were; plain values.
@@ -35,6 +35,7 @@ class EvaluationReport:
 
     model: str
     provider: str
+    precision: str
     hints: tuple[str, ...]
     data: str
     details: Mapping[str, Any]
@@ -60,6 +61,7 @@ class EvaluationReport:
         return {
             "model": self.model,
             "provider": self.provider,
+            "precision": self.precision,
             "hints": list(self.hints),
             "machine": machine_text(),
             "date": self.date,

@@ -134,6 +134,7 @@ def _report(
     return EvaluationReport(
         model=f"{model.card.name} ({Path(model.source).name}, {model.card.created})",
         provider=model.provider,
+        precision=model.precision,
         hints=tuple(sorted(sources.takes)),
         data=data,
         details=details,

@@ -71,3 +71,19 @@ def store_in_half(model: onnx.ModelProto) -> None:
     nodes = list(graph.node)
     del graph.node[:]
     graph.node.extend([*casts, *nodes])
+
+
+def restore_single(model: onnx.ModelProto) -> None:
+    """The inverse of `store_in_half`: constants in single precision, without the casts."""
+    graph = model.graph
+    constants = {constant.name: constant for constant in graph.initializer}
+    kept = []
+    for node in graph.node:
+        half = constants.get(node.input[0]) if node.op_type == "Cast" else None
+        if half is None or half.data_type != TensorProto.FLOAT16:
+            kept.append(node)
+            continue
+        values = numpy_helper.to_array(half).astype(np.float32)
+        half.CopyFrom(numpy_helper.from_array(values, node.output[0]))
+    del graph.node[:]
+    graph.node.extend(kept)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, cast
@@ -34,11 +34,17 @@ def trace(
             verbose=False,
         )
     model = cast(onnx.ModelProto, cast(Any, program).model_proto)
-    _strip_traces(model)
+    strip_traces(model)
     return model
 
 
-def write_checked(model: onnx.ModelProto, card: ModelCard, path: Path, check: Callable[[Path], None]) -> None:
+def write_checked(
+    model: onnx.ModelProto,
+    card: ModelCard,
+    path: Path,
+    check: Callable[[Path], None],
+    properties: Mapping[str, str] | None = None,
+) -> None:
     """Write a graph with its card; the file takes its place when the check has passed.
 
     Args:
@@ -46,9 +52,10 @@ def write_checked(model: onnx.ModelProto, card: ModelCard, path: Path, check: Ca
         card: what the file says about itself.
         path: where to; a failure leaves an old file whole.
         check: gets a file beside `path` and raises what is wrong with it.
+        properties: further entries of the file's metadata.
     """
     onnx.checker.check_model(model)
-    onnx.helper.set_model_props(model, {CARD_METADATA_KEY: card.to_json()})
+    onnx.helper.set_model_props(model, {CARD_METADATA_KEY: card.to_json(), **(properties or {})})
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f".{path.name}.part.onnx")
     try:
@@ -73,8 +80,8 @@ def _quiet_exporter() -> Iterator[None]:
         logger.setLevel(level)
 
 
-def _strip_traces(model: onnx.ModelProto) -> None:
-    """Take out the source lines, with this machine's paths, that PyTorch notes at every node."""
+def strip_traces(model: onnx.ModelProto) -> None:
+    """Take out the source lines, with this machine's paths, and the notes that tools leave at every node."""
     del model.metadata_props[:]
     del model.graph.metadata_props[:]
     model.doc_string = model.graph.doc_string = ""

@@ -20,6 +20,7 @@ from uavdepth.model.card import ModelCard
 from uavdepth.model.depth_model import DepthModel
 from uavdepth.model.hints import GroundHint, Hints
 from uavdepth.model.inference import InferenceSession, open_session
+from uavdepth.model.int8_file import int8_beside
 from uavdepth.model.network_file import WEIGHTS_FOLDER, shipped_networks
 from uavdepth.model.providers import PROVIDERS
 
@@ -148,7 +149,7 @@ def measure_networks(
     cv2.setNumThreads(1)
     runners: list[_Runner] = []
     for name in shipped_networks() if names is None else names:
-        model = DepthModel.load(name, "cpu")
+        model = DepthModel.load(name, "cpu", precision="float")
         path = Path(model.source)
         shown = path.stem if path.parent == WEIGHTS_FOLDER else str(path)
         runners += _on_every_provider(shown, path, model.card, note)
@@ -162,7 +163,7 @@ def measure_networks(
                 path, card = reference(PAPER_NETWORK, width, height, Path(folder))
                 runners += _on_every_provider(PAPER_NETWORK, path, card, note)
                 path, card = reference(BASELINE, width, height, Path(folder))
-                baselines.append(_Runner(BASELINE, open_session(path, "cpu", None), card))
+                baselines.append(_Runner(BASELINE, open_session(path, "cpu", None, "float"), card))
         except ReferenceUnavailableError as error:
             reason = str(error)
     for number in range(rounds + _WARM_UP):
@@ -175,15 +176,17 @@ def measure_networks(
 
 
 def _on_every_provider(name: str, path: Path, card: ModelCard, note: Callable[[str], None]) -> list[_Runner]:
-    """The network on each provider that is installed and takes it."""
+    """The network on each provider that is installed and takes it, in 8 bits too where that is what flies."""
     runners = []
     for provider, candidate in PROVIDERS.items():
         if not candidate.is_installed():
             continue
-        try:
-            runners.append(_Runner(name, open_session(path, provider, None), card))
-        except ModelFileError as error:
-            note(str(error))
+        has_int8 = candidate.prefers_int8() and int8_beside(path).is_file()
+        for precision in ("float", "int8") if has_int8 else ("float",):
+            try:
+                runners.append(_Runner(name, open_session(path, provider, None, precision), card))
+            except ModelFileError as error:
+                note(str(error))
     return runners
 
 

@@ -77,8 +77,8 @@ def measure_stages(model_name: str, pictures: list[NDArray[np.uint8]]) -> StageT
         pictures: (320, 640, 3) uint8 BGR each.
     """
     cv2.setNumThreads(1)
-    loaded = DepthModel.load(model_name, "cpu", 1)
-    session = open_session(Path(loaded.source), "cpu", 1)
+    loaded = DepthModel.load(model_name, "cpu", 1, precision="float")
+    session = open_session(Path(loaded.source), "cpu", 1, "float")
     watch = _Stopwatch(session.session)
     model = DepthModel(InferenceSession(watch, session.provider), loaded.card, loaded.source)
     factors = METRIC_FACTORS if loaded.card.metric else None

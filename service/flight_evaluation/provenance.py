@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 
 from service.flight_evaluation.evaluation import Evaluation
 from service.flight_evaluation.sight import DepthKind
-from uavdepth.model.depth_model import DepthModel
+from service.network import load_network
 
 
 def today() -> str:
@@ -15,9 +15,10 @@ def today() -> str:
 
 
 def model_name(evaluation: Evaluation) -> str:
-    """The network by its card, with the day it was made; "true depth" where none was flown."""
+    """The network by its card, the day it was made and what ran it; "true depth" where none was flown."""
     if DepthKind.NETWORK not in evaluation.plan.kinds:
         return "true depth"
-    card = DepthModel.load(evaluation.settings.model.path, "cpu", 1).card
+    model = load_network(evaluation.settings)
+    card = model.card
     hints = f", hints {' and '.join(card.hints)}" if card.hints else ", no hints"
-    return f"{card.name} of {card.created}{hints}"
+    return f"{card.name} of {card.created}{hints}, on {model.provider} in {model.precision}"

@@ -68,6 +68,8 @@ def evaluate_motion(
             "machine": machine_name(),
             "date": datetime.now(UTC).date().isoformat(),
             "model": None if network is None else network.card.name,
+            "provider": None if network is None else network.provider,
+            "precision": None if network is None else network.precision,
             "hints": [] if network is None else list(network.card.hints),
             "seconds": seconds,
             "pictures_per_s": rate,

@@ -31,6 +31,12 @@ class ModelSettings(Section):
         description="What computes the network; `auto` takes the first of the others that is installed and "
         "works.",
     )
+    precision: Literal["auto", "float", "int8"] = Field(
+        default="auto",
+        title="Numbers of the network",
+        description="`int8` takes the network's 8-bit file, `NAME-int8.onnx` beside `NAME.onnx`; `auto` does "
+        "where that is faster, `float` never does.",
+    )
     threads: int | None = Field(
         default=None,
         ge=1,

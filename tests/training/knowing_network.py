@@ -37,6 +37,7 @@ class KnowingNetwork:
         self._error = relative_error or {}
         self._sigma = sigma
         self.provider = "cpu"
+        self.precision = "fp32"
         self.source = "knowing.onnx"
         self.card = ModelCard(
             card_version=2,

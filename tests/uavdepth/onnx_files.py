@@ -11,6 +11,7 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 
 from uavdepth.model.card import CARD_METADATA_KEY
+from uavdepth.model.int8_file import SOURCE_METADATA_KEY, digest
 
 WIDTH, HEIGHT = 48, 32
 MEAN, STD = [0.485, 0.456, 0.406], [0.229, 0.224, 0.225]
@@ -57,6 +58,7 @@ def write_red_network(
     width: int = WIDTH,
     height: int = HEIGHT,
     gain: float = 1.0,
+    int8_of: Path | None = None,
 ) -> Path:
     """A network whose output is `gain` times its normalised red channel, log sigma a constant.
 
@@ -65,6 +67,7 @@ def write_red_network(
         card: the card to put into the metadata, or None for none.
         uncertainty: log of relative sigma, or None for a network without that output.
         width, height: size of the graph's input.
+        int8_of: the network that its metadata says it is the 8-bit file of.
     """
     picture = helper.make_tensor_value_info("image", TensorProto.FLOAT, [1, 3, height, width])
     depth = helper.make_tensor_value_info("log_inverse_depth", TensorProto.FLOAT, [1, 1, height, width])
@@ -90,8 +93,10 @@ def write_red_network(
     graph = helper.make_graph(nodes, "red", [picture], outputs, constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)])
     model.ir_version = 8
-    if card is not None:
-        helper.set_model_props(model, {CARD_METADATA_KEY: json.dumps(card)})
+    properties = {} if card is None else {CARD_METADATA_KEY: json.dumps(card)}
+    if int8_of is not None:
+        properties[SOURCE_METADATA_KEY] = digest(int8_of)
+    helper.set_model_props(model, properties)
     onnx.save(model, str(path))
     return path
 

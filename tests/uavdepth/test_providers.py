@@ -15,7 +15,12 @@ from uavdepth import ModelFileError
 from uavdepth.errors import ProviderFallbackWarning
 from uavdepth.model import providers
 from uavdepth.model.inference import open_session
-from uavdepth.model.providers import PROVIDERS, ProviderUnavailableError, computes_bfloat16
+from uavdepth.model.providers import (
+    PROVIDERS,
+    ProviderUnavailableError,
+    computes_bfloat16,
+    computes_int8,
+)
 
 open_cpu = PROVIDERS["cpu"].open
 
@@ -135,11 +140,33 @@ def test_bfloat16_is_used_where_the_processor_multiplies_it(
     info = tmp_path / "cpuinfo"
     info.write_text(text)
     monkeypatch.setattr(providers, "CPU_INFO", info)
-    assert computes_bfloat16.__wrapped__() is expected
+    assert computes_bfloat16() is expected
 
 
 def test_without_word_of_the_processor_bfloat16_is_not_used(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(providers, "CPU_INFO", tmp_path / "gone")
-    assert computes_bfloat16.__wrapped__() is False
+    assert computes_bfloat16() is False
+
+
+@pytest.mark.parametrize(
+    ("flags", "expected"),
+    [
+        ("avx512f avx512_vnni", True),
+        ("avx2 avx_vnni", True),
+        ("avx2 fma", False),
+        # 8 bits compute there too, but beside bfloat16 nobody measured which is faster.
+        ("avx512_vnni avx512_bf16", False),
+        ("amx_int8 amx_bf16", False),
+    ],
+)
+def test_openvino_is_given_8_bits_where_the_processor_has_them_and_no_bfloat16(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, flags: str, expected: bool
+) -> None:
+    info = tmp_path / "cpuinfo"
+    info.write_text(f"flags\t\t: fpu {flags} sse\n")
+    monkeypatch.setattr(providers, "CPU_INFO", info)
+    assert computes_int8() == ("vnni" in flags or "int8" in flags)
+    assert PROVIDERS["openvino"].prefers_int8() is expected
+    assert not any(PROVIDERS[name].prefers_int8() for name in ("cpu", "cuda", "tensorrt"))

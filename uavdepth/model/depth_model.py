@@ -49,7 +49,7 @@ class DepthModel:
         self.provider = inference.provider
         """ "tensorrt", "cuda", "openvino" or "cpu": what really runs the network."""
         self.precision = inference.precision
-        """ "fp32" or "bf16": the number format that it computes in."""
+        """ "fp32", "bf16" or "int8": the number format that it computes in."""
         self.fallback_reason = inference.fallback_reason
         """Why provider "auto" did not take a better one that is installed, or None."""
 
@@ -60,6 +60,7 @@ class DepthModel:
         provider: str = "auto",
         threads: int | None = None,
         card: str | Path | None = None,
+        precision: str = "auto",
     ) -> DepthModel:
         """Load a network and its card.
 
@@ -68,6 +69,8 @@ class DepthModel:
             provider: "auto", "tensorrt", "cuda", "openvino" or "cpu".
             threads: threads for inference; None: one for each core.
             card: a TOML card for a foreign network. None: the card inside the file, else `FILE.onnx.toml`.
+            precision: "float", "int8" for the network's 8-bit file (`uavdepth.model.int8_file`), or "auto"
+                for the faster of the two.
 
         Raises:
             ModelFileError: the file is missing, is not an ONNX network, or the provider cannot run it.
@@ -75,7 +78,7 @@ class DepthModel:
                 impossible key, or a card that does not describe this network.
         """
         path = find_network(path_or_name)
-        inference = open_session(path, provider, threads)
+        inference = open_session(path, provider, threads, precision)
         read = read_card(inference.session, path, None if card is None else Path(card))
         problems = network_problems(inference.session, read)
         if problems:

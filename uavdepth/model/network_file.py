@@ -9,6 +9,7 @@ from typing import Any
 
 from uavdepth.errors import ModelCardError, ModelFileError
 from uavdepth.model.card import CARD_FILE_SUFFIX, CARD_METADATA_KEY, ModelCard
+from uavdepth.model.int8_file import INT8_SUFFIX
 
 WEIGHTS_FOLDER = Path(__file__).parent.parent / "weights"
 """Networks that ship with the package: `<name>.onnx`."""
@@ -25,8 +26,9 @@ class Problem:
 
 
 def shipped_networks() -> list[str]:
-    """Names of the networks inside the package."""
-    return sorted(file.stem for file in WEIGHTS_FOLDER.glob("*.onnx"))
+    """Names of the networks inside the package; their 8-bit files are no networks of their own."""
+    names = (file.stem for file in WEIGHTS_FOLDER.glob("*.onnx"))
+    return sorted(name for name in names if not name.endswith(INT8_SUFFIX))
 
 
 def find_network(path_or_name: str | Path) -> Path:

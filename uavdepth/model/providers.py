@@ -9,7 +9,6 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +18,9 @@ if TYPE_CHECKING:
 CPU_INFO = Path("/proc/cpuinfo")
 BFLOAT16_FLAGS = frozenset({"avx512_bf16", "amx_bf16", "bf16"})
 """Flags of processors that multiply bfloat16: two of x86, one of ARM. Without them bf16 is the slower one."""
+
+INT8_FLAGS = frozenset({"avx512_vnni", "avx_vnni", "amx_int8"})
+"""Flags of x86 processors that multiply and add 8-bit numbers in one instruction."""
 
 _NO_FALLBACK = "session.disable_cpu_ep_fallback"
 """Without this ONNX Runtime would silently run on its own what a plug-in does not take."""
@@ -30,7 +32,7 @@ class ProviderUnavailableError(Exception):
 
 @dataclass(frozen=True)
 class OpenedSession:
-    """A session and the number format that it computes in: "fp32" or "bf16"."""
+    """A session and the number format that it computes in, "fp32" or "bf16", unless the file says int8."""
 
     session: Any
     precision: str = "fp32"
@@ -46,12 +48,14 @@ class ExecutionProvider:
         is_installed: whether its package is there, which says nothing about the hardware.
         open: loads an ONNX file with a number of threads (None: one for each core); raises
             `ProviderUnavailableError` or one of `runtime_errors`.
+        prefers_int8: whether it was measured to be faster with a network's 8-bit file on such a machine.
     """
 
     title: str
     extra: str
     is_installed: Callable[[], bool]
     open: Callable[[Path, int | None], OpenedSession]
+    prefers_int8: Callable[[], bool] = lambda: False
 
 
 def session_options(threads: int | None) -> onnxruntime.SessionOptions:
@@ -79,16 +83,24 @@ def runtime_errors() -> tuple[type[Exception], ...]:
     return (*own, RuntimeError, ValueError)
 
 
-@cache
 def computes_bfloat16() -> bool:
     """Whether this processor has bfloat16 arithmetic, as far as Linux tells; False elsewhere."""
+    return not BFLOAT16_FLAGS.isdisjoint(_processor_flags())
+
+
+def computes_int8() -> bool:
+    """Whether this processor has 8-bit arithmetic for networks, as far as Linux tells; False elsewhere."""
+    return not INT8_FLAGS.isdisjoint(_processor_flags())
+
+
+def _processor_flags() -> frozenset[str]:
     try:
         text = CPU_INFO.read_text(encoding="utf-8", errors="replace")
     except OSError:
-        return False
+        return frozenset()
     lines = (line.partition(":") for line in text.splitlines())
     flags = next((value for key, _, value in lines if key.strip() in ("flags", "Features")), "")
-    return not BFLOAT16_FLAGS.isdisjoint(flags.split())
+    return frozenset(flags.split())
 
 
 # -- ONNX Runtime's own
@@ -181,6 +193,11 @@ def _open_tensorrt(path: Path, threads: int | None) -> OpenedSession:
     return OpenedSession(ort.InferenceSession(str(path), options))
 
 
+def _openvino_prefers_int8() -> bool:
+    """Beside bfloat16 arithmetic, 8 bits were not measured."""
+    return computes_int8() and not computes_bfloat16()
+
+
 @contextmanager
 def _file_of(content: dict[str, Any]) -> Iterator[Path]:
     """JSON in a file for as long as ONNX Runtime reads it."""
@@ -202,7 +219,9 @@ PROVIDERS = {
         "TensorRT for RTX", _TENSORRT_EXTRA, _is_there(_TENSORRT_MODULE), _open_tensorrt
     ),
     "cuda": ExecutionProvider("CUDA", "onnxruntime-gpu", _has_cuda, _open_cuda),
-    "openvino": ExecutionProvider("OpenVINO", _OPENVINO_EXTRA, _is_there(_OPENVINO_MODULE), _open_openvino),
+    "openvino": ExecutionProvider(
+        "OpenVINO", _OPENVINO_EXTRA, _is_there(_OPENVINO_MODULE), _open_openvino, _openvino_prefers_int8
+    ),
     "cpu": ExecutionProvider("ONNX Runtime's CPU code", "onnxruntime", lambda: True, _open_cpu),
 }
 """By name, the fastest first where all of them run; the last one always does."""
