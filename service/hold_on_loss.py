@@ -10,6 +10,8 @@ from service.position_jump import has_jumped
 from service.status import speed_mps
 from service.telemetry import Telemetry
 from service.trouble import Trouble
+from uavdepth.attitude import Attitude
+from uavdepth.camera import CameraModel, CameraMount
 
 HOLD_AFTER_NS = 700_000_000
 """After the last message: a dropped picture or two is no loss, and ArduPilot opens the way 1.0 s after it at
@@ -27,6 +29,37 @@ _CREPT_M = 1.0
 
 _RECOVERED_NS = 3_000_000_000
 """Distances must have been sent for so long before a new loss may lead to a new request."""
+
+
+_BODY_RAD = math.radians(10.0)
+"""A vehicle that flies so far beside a camera's view still comes into it with its side."""
+
+
+@dataclass(frozen=True)
+class Sight:
+    """Directions that a camera sees.
+
+    Args:
+        bearing_rad: of its axis from the nose, clockwise.
+        half_width_rad: to either side of it.
+    """
+
+    bearing_rad: float
+    half_width_rad: float
+
+    @classmethod
+    def of(cls, camera: CameraModel, mount: CameraMount) -> Sight:
+        """From the left edge of the picture's middle row to the right one."""
+        row = camera.normalized_rays[camera.height // 2] @ mount.body_from_camera.T
+        left, axis, right = (math.atan2(row[x, 1], row[x, 0]) for x in (0, camera.width // 2, -1))
+        return cls(axis, max(abs(math.remainder(edge - axis, math.tau)) for edge in (left, right)))
+
+    def meets(self, way_ned: tuple[float, float], attitude: Attitude | None) -> bool:
+        """Whether a way north and east leads into it; who knows no heading must think so."""
+        if attitude is None:
+            return True
+        bearing = math.atan2(way_ned[1], way_ned[0]) - attitude.yaw_rad - self.bearing_rad
+        return not abs(math.remainder(bearing, math.tau)) > self.half_width_rad + _BODY_RAD
 
 
 @dataclass(frozen=True)
@@ -58,15 +91,20 @@ class Moment:
 class HoldOnLoss:
     """Asks once for each loss, for an armed vehicle that moves in a mode that distances act in.
 
-    A vehicle moves if it is fast, or has come a metre without distances. Where a part of the service has
+    A vehicle moves if it is fast, or has come a metre without distances; where one camera of several is lost,
+    into what that one saw. Where a part of the service has
     failed, one that hovers is watched until it moves, however late. Where only metres are missing it is
     watched for 5 s: moving is how they come back, and who hovers long has none.
 
     Who has chosen another mode since flies: nothing is asked of a pilot who has taken over, until the vehicle
     has been armed again or distances have been sent for 3 s.
+
+    Args:
+        sight: of the camera whose distances these are; None where all directions hang on them.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, sight: Sight | None = None) -> None:
+        self._sight = sight
         self._mode_before: str | None = None
         """The mode that distances acted in while they were sent; None if none did."""
         self._is_over = False
@@ -116,8 +154,14 @@ class HoldOnLoss:
         self._mode_before = moment.mode if _acts(moment.autopilot, moment.mode) else None
 
     def _is_moving(self, pose: Telemetry) -> bool:
-        speed = speed_mps(pose)
-        return (speed is not None and speed >= _MOVING_MPS) or self._way.length_m >= _CREPT_M
+        velocity, speed = pose.velocity_ned_mps, speed_mps(pose)
+        is_fast = speed is not None and speed >= _MOVING_MPS
+        if is_fast and velocity is not None and self._leads_there(velocity[:2], pose):
+            return True
+        return self._way.length_m >= _CREPT_M and self._leads_there(self._way.north_east_m, pose)
+
+    def _leads_there(self, way_ned: tuple[float, float], pose: Telemetry) -> bool:
+        return self._sight is None or self._sight.meets(way_ned, pose.attitude)
 
 
 class _Way:
@@ -126,6 +170,11 @@ class _Way:
     def __init__(self) -> None:
         self._last: Telemetry | None = None
         self._north_m = self._east_m = 0.0
+
+    @property
+    def north_east_m(self) -> tuple[float, float]:
+        """The way."""
+        return self._north_m, self._east_m
 
     @property
     def length_m(self) -> float:

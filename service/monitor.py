@@ -7,17 +7,14 @@ from collections.abc import Callable
 
 import structlog
 
-from service.autopilot.hold_request import HoldOutcome
-from service.autopilot.link_status import LinkStatus
 from service.autopilot.service_state import ServiceState
 from service.cameras.reader import CameraReader
 from service.clock import Clock
-from service.health import SEVERITY_CRITICAL, Announcer, Vitals, state_of, trouble_of
-from service.hold_on_loss import HoldOnLoss, Moment
+from service.health import Announcer, Vitals, state_of, trouble_of
+from service.hold_keeper import HoldKeeper
 from service.link import Link
 from service.progress import Progress
 from service.side_cameras import SideCameras
-from service.status import speed_mps
 from service.trouble import Trouble
 
 log = structlog.get_logger()
@@ -38,7 +35,7 @@ class Monitor:
         started_ns: when the service started.
         publish: hands the status to the ground station; None if nobody listens.
         publish_period_ns: how often.
-        on_loss: asks the vehicle to hold when perception is lost; None where only the pilot is told.
+        holds: asks the vehicle to hold when perception is lost; None where only the pilot is told.
     """
 
     def __init__(
@@ -51,7 +48,7 @@ class Monitor:
         started_ns: int,
         publish: Callable[[], None] | None,
         publish_period_ns: int,
-        on_loss: HoldOnLoss | None = None,
+        holds: HoldKeeper | None = None,
     ) -> None:
         self._clock = clock
         self._link = link
@@ -61,9 +58,7 @@ class Monitor:
         self._started_ns = started_ns
         self._publish = publish
         self._publish_period_ns = publish_period_ns
-        self._on_loss = on_loss
-        self._hold_told: HoldOutcome | None = None
-        self._hold_mode = ""
+        self._holds = holds
         self._publish_due_ns = started_ns
         self._announcer = Announcer()
         self._was_armed: bool | None = None
@@ -115,8 +110,8 @@ class Monitor:
         self.trouble = trouble_of(vitals)
         self.state = state_of(self.trouble, vitals)
         self._link.set_state(self.state)
-        if self._on_loss is not None:
-            self._hold_on_loss(self._on_loss, vitals, link)
+        if self._holds is not None:
+            self._holds.hear(vitals, self.trouble, link, self._sides.losses)
         words = self._announcer.hear(self.trouble, self.state, vitals.now_ns)
         if words is None:
             return
@@ -124,39 +119,6 @@ class Monitor:
         reasons = (camera.detail, link.problem, None if result is None else result.detail)
         known = [reason for reason in reasons if reason]
         log.info(words.text, state=self.state.name, **({"because": "; ".join(known)} if known else {}))
-
-    def _hold_on_loss(self, on_loss: HoldOnLoss, vitals: Vitals, link: LinkStatus) -> None:
-        moment = Moment(
-            vitals.now_ns,
-            self.trouble,
-            vitals.sent_ns,
-            vitals.protected,
-            link.connected,
-            link.armed,
-            link.autopilot,
-            link.mode,
-            self._link.newest_pose(),
-        )
-        if on_loss.hear(moment):
-            self._hold_mode = self._link.hold()
-            if not self._hold_mode:
-                self._link.say(SEVERITY_CRITICAL, "uavdepth: knows no mode that stops this vehicle")
-            log.warning(
-                "wants the vehicle to hold",
-                mode=self._hold_mode,
-                because=self.trouble and self.trouble.value,
-                flown_in=moment.mode,
-                speed_mps=speed_mps(moment.pose),
-                way_m=round(on_loss.way_m, 2),
-            )
-        if link.hold is not self._hold_told:
-            was_asked, self._hold_told = self._hold_told is HoldOutcome.ASKED, link.hold
-            if link.hold is HoldOutcome.ASKED or (link.hold is HoldOutcome.GRANTED and not was_asked):
-                self._link.say(SEVERITY_CRITICAL, f"uavdepth: asks for {self._hold_mode}")
-            if link.hold in (HoldOutcome.REFUSED, HoldOutcome.UNANSWERED):
-                self._link.say(SEVERITY_CRITICAL, f"uavdepth: hold {link.hold.value}, fly by hand")
-            if link.hold is not None:
-                log.info("request to hold", outcome=link.hold.value)
 
     def _note_arming(self, armed: bool | None) -> int | None:
         """When the vehicle was armed last; `armed` is what it is now."""

@@ -17,7 +17,7 @@ from service.clock import Clock, MonotonicClock
 from service.frame import Frame
 from service.fresh_frames import FreshFrames
 from service.health import SEVERITY_WARNING
-from service.hold_on_loss import HoldOnLoss
+from service.hold_keeper import HoldKeeper
 from service.latency_advice import Latency, advise_all
 from service.latest_slot import LatestSlot
 from service.link import Link
@@ -111,7 +111,7 @@ class Service:
             self._started_ns,
             self._tell_status if told else None,
             round(1e9 / settings.zenoh.status_rate_hz),
-            HoldOnLoss() if settings.autopilot.on_loss == "hold" else None,
+            HoldKeeper(self._link, self._sides.sights) if settings.autopilot.on_loss == "hold" else None,
         )
 
     def start(self) -> None:

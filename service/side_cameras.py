@@ -16,12 +16,13 @@ from service.cameras.source import make_camera
 from service.clock import Clock
 from service.frame import Frame
 from service.health import SEVERITY_WARNING
+from service.hold_on_loss import Sight
 from service.latest_slot import LatestSlot
 from service.perception_result import PerceptionResult
 from service.pipeline import Perception
 from service.settings import ExtraCameraSettings, Settings
 from service.side_merge import SideMerge
-from service.side_watch import SideWatch
+from service.side_watch import SideLoss, SideWatch
 from service.status import SideStatus
 from uavdepth.errors import UavDepthError
 
@@ -125,6 +126,18 @@ class SideCameras:
     def added_to(self, result: PerceptionResult) -> PerceptionResult:
         """The main camera's result with what the sides see; itself where it is not trusted."""
         return self._merge.added_to(result)
+
+    @property
+    def sights(self) -> dict[str, Sight]:
+        """Directions that each side sees, by its name."""
+        return {
+            side.name: Sight.of(side.settings.camera.model, side.settings.mount.mount) for side in self._sides
+        }
+
+    @property
+    def losses(self) -> dict[str, SideLoss]:
+        """What each side lacked when it was judged last, by its name."""
+        return {side.name: side.watch.loss for side in self._sides}
 
     def sent(self, at_ns: int) -> None:
         """Note that the newest merged scan left at `at_ns`; to be called by the thread that merges."""

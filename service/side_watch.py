@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import structlog
 
@@ -19,6 +20,19 @@ _SETTLED_NS = 1_000_000_000
 
 _FAILED_NS = 300_000_000
 """One that has failed is told sooner: to ArduPilot its directions are free from now on (measured)."""
+
+
+@dataclass(frozen=True)
+class SideLoss:
+    """What a further camera lacks.
+
+    Args:
+        trouble: why its distances are missing from what is sent; None if they are not.
+        sent_ns: when they were sent last; None if never.
+    """
+
+    trouble: Trouble | None
+    sent_ns: int | None
 
 
 class SideWatch:
@@ -42,6 +56,11 @@ class SideWatch:
         """What the pilot was told of; None if the side is well."""
         self._changed_ns: int | None = None
         self._losses = 0
+
+    @property
+    def loss(self) -> SideLoss:
+        """As last judged."""
+        return SideLoss(self._trouble, self.progress.sent_ns)
 
     def judge(self, now_ns: int, camera: CameraStatus, left_out: Trouble | None, *, is_sending: bool) -> None:
         """Find out what is wrong now, and tell the pilot of a side that is lost or back.

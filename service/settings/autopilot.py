@@ -72,8 +72,9 @@ class AutopilotSettings(Section):
         title="When perception is lost",
         description="`warn`: STATUSTEXT and HEARTBEAT CRITICAL within 0.5 s. `hold`: besides, 0.7 s after "
         "the last distances, the autopilot is asked once for BRAKE (ArduCopter), HOLD (ArduRover) or Hold "
-        "(PX4), if the vehicle is armed and flies in a mode that distances act in, as soon as it moves. "
-        "Nothing is asked of a pilot who has changed the mode since.",
+        "(PX4), if the vehicle is armed and flies in a mode that distances act in, as soon as it moves; "
+        "where one of several cameras is lost, as soon as it moves into what that one saw. Nothing is asked "
+        "of a pilot who has changed the mode since.",
     )
     max_frame_age_s: float = Field(
         default=0.3,
