@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,6 +90,12 @@ class TrueDepth:
         return DepthMap(depth, np.full_like(depth, _TRUE_SIGMA))
 
 
+@lru_cache(maxsize=1)
+def _with_network(settings: Settings) -> Perception:
+    """Loading takes seconds, and a hundred flights look with one network."""
+    return Perception.load(settings)
+
+
 class Eyes:
     """The service's perception over one kind of depth. It remembers: one for each flight.
 
@@ -109,7 +116,7 @@ class Eyes:
                 settings, self._true, None, make_scanner(settings), takes=("ground",)
             )
         else:
-            self.perception = Perception.load(settings)
+            self.perception = _with_network(settings).beside(settings)
 
     def frame(self, sight: Sight, captured_ns: int, index: int) -> Frame:
         """The frame of a sight; the true depth source is told its depth."""
