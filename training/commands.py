@@ -43,6 +43,10 @@ def export(
     size: Annotated[
         str | None, typer.Option(help="Input as WIDTHxHEIGHT; that of the run's last phase if not given.")
     ] = None,
+    further_data: Annotated[
+        str,
+        typer.Option(help="What else it learnt from than its frames, with licences, for the card."),
+    ] = "",
     calibrate: Annotated[
         Path | None,
         typer.Option(
@@ -65,8 +69,10 @@ def export(
 
     wanted = _parsed_size(size)
     if is_checkpoint_of(checkpoint, FROM_VIDEO):
-        if calibrate is not None or measured is not None:
-            raise ExportError(f"{checkpoint} is of train-video: --calibrate and --measured are not for it")
+        if calibrate is not None or measured is not None or further_data:
+            raise ExportError(
+                f"{checkpoint} is of train-video: --calibrate, --measured and --further-data are not for it"
+            )
         _tell(_export_video(checkpoint, output, name, wanted), output)
         return
     errors = _measured_errors(measured) if measured is not None else {}
@@ -76,7 +82,7 @@ def export(
         found = _calibrated(run, wanted, name, calibrate, calibration_seeds)
         errors["sigma_calibration"], factor = found.as_json(), found.factor
         typer.echo(f"sigma is multiplied by {factor:.3f}, from {found.frames} frames of {found.data}")
-    _tell(export_checkpoint(run, output, name, errors, wanted, factor), output)
+    _tell(export_checkpoint(run, output, name, errors, wanted, factor, further_data), output)
 
 
 def _export_video(checkpoint: Path, output: Path, name: str, size: tuple[int, int] | None) -> ModelCard:

@@ -66,6 +66,7 @@ def export_checkpoint(
     measured: Mapping[str, JsonValue] | None = None,
     size: tuple[int, int] | None = None,
     sigma_factor: float = 1.0,
+    further_data: str = "",
 ) -> ModelCard:
     """Write the averaged weights of a run, in half precision, as an ONNX file with its card.
 
@@ -80,6 +81,7 @@ def export_checkpoint(
         measured: errors on frames it was not trained on, for the card.
         size: width and height of the input, divisible by 32; None takes those of the run's last phase.
         sigma_factor: what the network's sigma is multiplied by, see `training.doubt_calibration`.
+        further_data: what else than its frames it learnt from, with licences, for the card.
 
     Returns:
         The card that was written.
@@ -92,7 +94,7 @@ def export_checkpoint(
     if not (math.isfinite(sigma_factor) and sigma_factor > 0):
         raise ExportError(f"the factor of sigma is {sigma_factor}: a finite number above 0 is needed")
     last = checkpoint.settings.phases[-1]
-    card = make_card(checkpoint, name, measured or {}, size or (last.width, last.height))
+    card = make_card(checkpoint, name, measured or {}, size or (last.width, last.height), further_data)
     network = _TwoOutputs(rounded_network(checkpoint.averaged_network()), sigma_factor).eval()
     model = _to_onnx(network, card)
     store_in_half(model)
@@ -101,7 +103,11 @@ def export_checkpoint(
 
 
 def make_card(
-    checkpoint: Checkpoint, name: str, measured: Mapping[str, JsonValue], size: tuple[int, int]
+    checkpoint: Checkpoint,
+    name: str,
+    measured: Mapping[str, JsonValue],
+    size: tuple[int, int],
+    further_data: str = "",
 ) -> ModelCard:
     """What the file will say about itself. Raises ExportError for a size that the network cannot take."""
     if any(side % 32 or side < 64 for side in size):
@@ -122,6 +128,7 @@ def make_card(
         training_data=(
             f"{checkpoint.frames} rendered frames with exact depth of {checkpoint.worlds} worlds of "
             "uavdepth.scenes; encoder EfficientNet-Lite0 from ImageNet weights (Apache-2.0)"
+            f"{'; ' if further_data else ''}{further_data}"
         ),
         effort=(
             f"{checkpoint.images} pictures in {checkpoint.step} steps, {checkpoint.trained_s / 3600:.1f} "

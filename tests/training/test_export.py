@@ -63,7 +63,8 @@ def checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Checkpoint:
 @pytest.fixture(scope="module")
 def exported(checkpoint: Checkpoint, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("export") / "network.onnx"
-    export_checkpoint(checkpoint, path, "narrow", {"median_scaled": {"abs_rel": 0.25}}, SIZE, SIGMA_FACTOR)
+    measured = {"median_scaled": {"abs_rel": 0.25}}
+    export_checkpoint(checkpoint, path, "narrow", measured, SIZE, SIGMA_FACTOR, "two photographs (CC0)")
     return path
 
 
@@ -75,6 +76,8 @@ def test_the_card_says_what_the_file_is(checkpoint: Checkpoint, exported: Path) 
     assert card.max_depth_m == MAX_DEPTH_M
     assert card.measured == {"median_scaled": {"abs_rel": 0.25}}
     assert f"{checkpoint.images} pictures" in card.effort
+    assert f"{checkpoint.frames} rendered frames" in card.training_data
+    assert card.training_data.endswith("; two photographs (CC0)")
 
 
 def some_hints(camera: CameraModel) -> Hints:
