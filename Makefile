@@ -22,7 +22,7 @@ define make_environment
 endef
 
 $(DEMO)/.ready: pyproject.toml constraints.txt
-	$(call make_environment,$(DEMO),sim)
+	$(call make_environment,$(DEMO),sim$(comma)openvino)
 
 $(DEV)/.ready: pyproject.toml constraints.txt
 	$(call make_environment,$(DEV),sim$(comma)train$(comma)dev)
