@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field, replace
 
 from training.data.hint_sampling import HintShares
 from training.data.surface_patterns import AppearanceShares
@@ -136,3 +136,22 @@ class TrainingSettings:
             return 0.05 + 0.95 * progress / self.warm_up
         fall = (progress - self.warm_up) / (1.0 - self.warm_up)
         return self.final_rate + (1.0 - self.final_rate) * 0.5 * (1.0 + math.cos(math.pi * min(fall, 1.0)))
+
+
+FINE_TUNING_RATE = 0.35
+"""Of the highest learning rates: enough to learn by, and little enough not to begin anew."""
+
+
+def for_fine_tuning(settings: TrainingSettings) -> TrainingSettings:
+    """The same for a run that begins with a trained network.
+
+    Lower rates, the exported sizes from the start, and half as many changed surfaces: those teach what a
+    trained network lacks, but what it is measured by is the worlds as they are.
+    """
+    return replace(
+        settings,
+        phases=settings.phases[-1:],
+        decoder_rate=FINE_TUNING_RATE * settings.decoder_rate,
+        encoder_rate=FINE_TUNING_RATE * settings.encoder_rate,
+        appearance=AppearanceShares(*(share / 2 for share in astuple(settings.appearance))),
+    )

@@ -44,6 +44,10 @@ def train(
         Path | None,
         typer.Option(help="Checkpoint of another run to start from, wherever its weights fit."),
     ] = None,
+    fine_tune: Annotated[
+        bool,
+        typer.Option(help="With --init: lower rates, full size, half as many changed surfaces."),
+    ] = False,
     resume: Annotated[bool, typer.Option(help="Go on from the checkpoint in the run's folder.")] = False,
     seed: Annotated[
         int | None, typer.Option(help="Seed of random weights and of the order of pictures; 0 if not given.")
@@ -63,7 +67,9 @@ def train(
     """
     if init is not None and resume:
         raise TrainingSettingsError(f"--init {init} and --resume: a run goes on or starts, not both")
-    settings = _settings_maker(minutes, images, seed, precision)
+    if fine_tune and init is None:
+        raise TrainingSettingsError("--fine-tune needs --init: a run on a trained network")
+    settings = _settings_maker(minutes, images, seed, precision, fine_tune)
     if render:
         _render(data, scenes, seeds, frames_per_seed)
     with needs_extra("train", "train"):
@@ -97,7 +103,7 @@ SettingsMaker = Callable[["TrainingSettings | None"], "TrainingSettings"]
 
 
 def _settings_maker(
-    minutes: float | None, images: int | None, seed: int | None, precision: str
+    minutes: float | None, images: int | None, seed: int | None, precision: str, fine_tune: bool = False
 ) -> SettingsMaker:
     """How to get a run's settings, from those of its checkpoint if it goes on."""
     if minutes is not None and images is not None:
@@ -106,11 +112,12 @@ def _settings_maker(
     def make(previous: TrainingSettings | None) -> TrainingSettings:
         from dataclasses import replace
 
-        from training.settings import TrainingSettings
+        from training.settings import TrainingSettings, for_fine_tuning
 
         if previous is None:
             length = DEFAULT_MINUTES if minutes is None and images is None else minutes
-            return TrainingSettings(images=images, minutes=length, seed=seed or 0, precision=precision)
+            new = TrainingSettings(images=images, minutes=length, seed=seed or 0, precision=precision)
+            return for_fine_tuning(new) if fine_tune else new
         if seed is not None and seed != previous.seed:
             raise TrainingSettingsError(
                 f"--seed is {seed}, but the run was started with {previous.seed}: other pictures would "

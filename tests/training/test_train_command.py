@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -18,7 +19,7 @@ from training.checkpoint import Checkpoint
 from training.data.batches import FramePool
 from training.data.rendering import RenderPlan
 from training.errors import CheckpointError, TrainingSettingsError
-from training.settings import TrainingSettings
+from training.settings import TrainingSettings, for_fine_tuning
 from training.train_command import train
 from training.trainer import Trainer
 
@@ -58,6 +59,19 @@ def test_the_command_trains_and_refuses_to_overwrite(
         CliRunner().invoke(app, [*words, "--resume", "--seed", "5"], catch_exceptions=False)
     longer = [*words[:-1], "12", "--resume"]
     assert CliRunner().invoke(app, longer, catch_exceptions=False).exit_code == 0
+
+    with pytest.raises(TrainingSettingsError, match="--fine-tune needs --init"):
+        CliRunner().invoke(app, [*words, "--fine-tune"], catch_exceptions=False)
+    begun = Checkpoint.load(tmp_path / "run" / "checkpoint.pt").settings
+    finer = [*words, "--output", str(tmp_path / "finer"), "--fine-tune"]
+    finer += ["--init", str(tmp_path / "run" / "checkpoint.pt")]
+    assert CliRunner().invoke(app, finer, catch_exceptions=False).exit_code == 0
+    tuned = Checkpoint.load(tmp_path / "finer" / "checkpoint.pt").settings
+    assert tuned == for_fine_tuning(replace(begun, images=8))
+    assert tuned.decoder_rate < 0.5 * begun.decoder_rate
+    assert tuned.encoder_rate < 0.5 * begun.encoder_rate
+    assert tuned.appearance.photos == 0.5 * begun.appearance.photos
+    assert tuned.phases == begun.phases[-1:]
     assert Checkpoint.load(tmp_path / "run" / "checkpoint.pt").images == 12
 
 
