@@ -109,3 +109,18 @@ def test_the_model_says_what_it_computes_in(network: Path) -> None:
 def test_8_bit_files_are_no_networks_of_their_own(network: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(network_file, "WEIGHTS_FOLDER", network.parent)
     assert shipped_networks() == ["net"]
+
+
+@pytest.mark.parametrize("name", shipped_networks())
+def test_every_shipped_network_has_an_8_bit_file_that_was_made_from_it_and_sees_alike(name: str) -> None:
+    exact, coarse = (DepthModel.load(name, "cpu", 1, precision=each) for each in ("float", "int8"))
+    assert coarse.precision == "int8"
+    said = coarse.card.measured["int8_against_float"]
+    assert isinstance(said, dict)
+    assert {"none", "ground", "ground+100 points"} == set(said)
+    camera = CameraModel.from_fov(64, 32, 90.0)
+    rows = np.linspace(230, 40, 32).astype(np.uint8)
+    picture = np.repeat(np.repeat(rows[:, None, None], 64, axis=1), 3, axis=2)
+    ratio = coarse.infer(picture, camera).depth_m / exact.infer(picture, camera).depth_m
+    assert np.median(np.abs(np.log(ratio))) < 0.1
+    assert not np.array_equal(ratio, np.ones_like(ratio))
