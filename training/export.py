@@ -35,7 +35,7 @@ INTENDED_USE = (
     "they are known; as an aid beside a pilot."
 )
 LIMITS = (
-    "Taught by rendered pictures alone. Without hints its metres are a guess. Thin things (wires, twigs), "
+    "Taught by rendered pictures, photographs on some surfaces apart. Without hints its metres are a guess. Thin things (wires, twigs), "
     "glass, water, night and fog are missed or misjudged. It says its doubt as sigma: heed it."
 )
 
