@@ -35,8 +35,9 @@ INTENDED_USE = (
     "they are known; as an aid beside a pilot."
 )
 LIMITS = (
-    "Taught by rendered pictures, photographs on some surfaces apart. Without hints its metres are a guess. Thin things (wires, twigs), "
-    "glass, water, night and fog are missed or misjudged. It says its doubt as sigma: heed it."
+    "Taught by rendered pictures, photographs on some surfaces apart. Without hints its metres are a guess. "
+    "Thin things (wires, twigs), glass, water, night and fog are missed or misjudged. It says its doubt as "
+    "sigma: heed it."
 )
 
 EXPORT_SIZES = ((384, 192), (640, 320))
