@@ -58,7 +58,7 @@ class HoldKeeper:
         )
         if self._all.hear(moment):
             self._ask(self._all, moment)
-        elif trouble is None:
+        elif trouble is None or link.armed is False:  # disarmed, each begins anew
             for name, loss in sides.items():
                 given = replace(vitals, sent_ns=loss.sent_ns)
                 of_side = replace(

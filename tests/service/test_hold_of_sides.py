@@ -9,12 +9,17 @@ import pytest
 from program_fakes import FakeLink, ScriptedCamera, make_settings, picture, wait_until
 from running_service import endless_camera, loader, network, texts
 
+from service.autopilot.hold_request import HoldOutcome
+from service.cameras.reader import CameraState
 from service.clock import MonotonicClock
 from service.errors import CameraError
+from service.health import Vitals
+from service.hold_keeper import HoldKeeper
 from service.hold_on_loss import HoldOnLoss, Moment, Sight
 from service.run import Service
 from service.settings import Settings
 from service.settings.extra_camera import ExtraCameraSettings
+from service.side_watch import SideLoss
 from service.telemetry import Telemetry
 from service.trouble import Trouble
 from uavdepth.attitude import Attitude
@@ -82,6 +87,36 @@ def test_a_cameras_sight_is_where_it_looks(yaw_deg: float, pitch_deg: float) -> 
         0.0, abs=1.5
     )
     assert 38.0 < math.degrees(sight.half_width_rad) < 45.0
+
+
+def test_after_a_landing_a_side_begins_anew() -> None:
+    """On the ground all cameras are in trouble; what one flight has asked for must not count in the next."""
+    link = FlyingLink(MonotonicClock(), mode="LOITER")
+    keeper = HoldKeeper(link, {"right": RIGHT})
+    link.velocity_ned_mps = (0.0, 2.0, 0.0)
+
+    def hear(at_s: float, armed: bool, main: Trouble | None, side: Trouble | None, sent_s: float) -> bool:
+        link.hold_outcome, link.armed = None, armed
+        now_ns = round(at_s * S)
+        vitals = Vitals(
+            now_ns=now_ns,
+            started_ns=0,
+            camera=CameraState.DELIVERING,
+            link_connected=True,
+            armed=armed,
+            frame_ns=now_ns,
+            result_ns=now_ns,
+            result_trouble=main,
+            sent_ns=now_ns,
+        )
+        keeper.hear(vitals, main, link.status(), {"right": SideLoss(side, round(sent_s * S))})
+        return link.hold_outcome is HoldOutcome.ASKED
+
+    assert not hear(1.0, True, None, None, 1.0)
+    assert hear(2.0, True, None, Trouble.CAMERA_LOST, 1.0)
+    assert not hear(3.0, False, Trouble.ON_GROUND, Trouble.CAMERA_LOST, 1.0)
+    assert not hear(10.0, True, None, None, 10.0)
+    assert hear(11.0, True, None, Trouble.CAMERA_LOST, 10.0)
 
 
 # -- in the service

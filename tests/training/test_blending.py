@@ -8,23 +8,14 @@ from pathlib import Path
 import pytest
 import torch
 from frames import make_store
+from small_runs import SMALL, one_size
 
 from training.blend_command import blend as blend_command
 from training.blending import blend
 from training.checkpoint import Checkpoint
 from training.data.batches import FramePool
 from training.errors import CheckpointError
-from training.networks.depth_network import NetworkShape
-from training.settings import SizePhase, TrainingSettings
 from training.trainer import Trainer
-
-SHAPE = NetworkShape(
-    channels=(4, 4, 4, 4, 4),
-    head_channels=4,
-    frozen_stages=6,
-    hint_channels=(4, 4, 4, 4, 4),
-    correction_channels=4,
-)
 
 
 @pytest.fixture(scope="module")
@@ -32,9 +23,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Checkpoint, Checkpoi
     """A run, and one that began with its weights."""
     folder = tmp_path_factory.mktemp("runs")
     pool = FramePool(make_store(folder / "frames"))
-    settings = TrainingSettings(
-        images=4, phases=(SizePhase(1.0, 96, 64, 2),), large=None, shape=SHAPE, precision="fp32"
-    )
+    settings = one_size()
     first = Trainer(settings, pool, pretrained=False)
     list(first.run())
     first.save(folder / "first.pt")
@@ -81,7 +70,7 @@ def test_shares_that_make_no_mean_are_refused(
 
 def test_networks_of_different_shapes_are_refused(runs: tuple[Checkpoint, Checkpoint]) -> None:
     first, second = runs
-    other = replace(second, settings=replace(second.settings, shape=replace(SHAPE, head_channels=8)))
+    other = replace(second, settings=replace(second.settings, shape=replace(SMALL, head_channels=8)))
     with pytest.raises(CheckpointError, match="different shapes"):
         blend((first, other), (0.5, 0.5))
 

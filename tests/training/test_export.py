@@ -11,21 +11,19 @@ import numpy as np
 import onnx
 import pytest
 import torch
-from frames import make_store
+from small_runs import two_steps
 
 import training.export
 from training.checkpoint import Checkpoint
 from training.commands import export
-from training.data.batches import FramePool, network_image
+from training.data.batches import network_image
 from training.data.hint_sampling import hint_maps
 from training.data.views import View
 from training.errors import CheckpointError, EvaluationError, ExportError
 from training.export import export_checkpoint
 from training.half_weights import SMALLEST_HALVED, rounded_network
-from training.networks.depth_network import NetworkShape
 from training.normalization import MAX_DEPTH_M, depth_from_output
-from training.settings import SizePhase, TrainingSettings
-from training.trainer import Trainer
+from training.settings import SizePhase
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
 from uavdepth.model.depth_model import DepthModel
@@ -41,23 +39,7 @@ SIGMA_FACTOR = 0.5
 
 @pytest.fixture(scope="module")
 def checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Checkpoint:
-    """Two steps of a narrow network."""
-    settings = TrainingSettings(
-        images=4,
-        phases=(SizePhase(1.0, 96, 64, 2),),
-        large=None,
-        shape=NetworkShape(
-            channels=(4, 4, 4, 4, 4),
-            head_channels=4,
-            frozen_stages=6,
-            hint_channels=(4, 4, 4, 4, 4),
-            correction_channels=4,
-        ),
-        precision="fp32",
-    )
-    trainer = Trainer(settings, FramePool(make_store(tmp_path_factory.mktemp("frames"))), pretrained=False)
-    list(trainer.run())
-    return trainer.checkpoint()
+    return two_steps(tmp_path_factory.mktemp("frames"))
 
 
 @pytest.fixture(scope="module")

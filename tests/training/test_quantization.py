@@ -9,18 +9,14 @@ import onnx
 import pytest
 from frames import ground_frame, make_store
 from onnx import numpy_helper
+from small_runs import two_steps
 
 from training import quantization
-from training.checkpoint import Checkpoint
-from training.data.batches import FramePool
 from training.errors import EvaluationError, ExportError
 from training.evaluation_frames import EvaluationPlan
 from training.export import export_checkpoint
 from training.half_weights import SMALLEST_HALVED, restore_single, store_in_half
-from training.networks.depth_network import NetworkShape
 from training.quantization import quantize
-from training.settings import SizePhase, TrainingSettings
-from training.trainer import Trainer
 from uavdepth.model.depth_model import DepthModel
 from uavdepth.model.int8_file import int8_beside
 
@@ -28,22 +24,7 @@ from uavdepth.model.int8_file import int8_beside
 @pytest.fixture(scope="module")
 def network(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A narrow network after two steps."""
-    settings = TrainingSettings(
-        images=4,
-        phases=(SizePhase(1.0, 96, 64, 2),),
-        large=None,
-        shape=NetworkShape(
-            channels=(4, 4, 4, 4, 4),
-            head_channels=4,
-            frozen_stages=6,
-            hint_channels=(4, 4, 4, 4, 4),
-            correction_channels=4,
-        ),
-        precision="fp32",
-    )
-    trainer = Trainer(settings, FramePool(make_store(tmp_path_factory.mktemp("frames"))), pretrained=False)
-    list(trainer.run())
-    checkpoint: Checkpoint = trainer.checkpoint()
+    checkpoint = two_steps(tmp_path_factory.mktemp("frames"))
     path = tmp_path_factory.mktemp("network") / "net.onnx"
     export_checkpoint(checkpoint, path, "narrow")
     return path
