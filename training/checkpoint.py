@@ -152,7 +152,8 @@ def _load_state(network: DepthNetwork, state: dict[str, Tensor]) -> None:
 
 def _settings(fields: dict[str, Any]) -> TrainingSettings:
     fields["phases"] = tuple(SizePhase(**phase) for phase in fields["phases"])
-    fields["loss"] = LossWeights(**fields["loss"])
+    # Runs begun before thin things counted more go on as they were.
+    fields["loss"] = LossWeights(**{"thin": 1.0, **fields["loss"]})
     fields["shape"] = NetworkShape(**fields["shape"])
     fields["hints"] = HintShares(**fields["hints"])
     # Runs begun before surfaces were changed go on without.

@@ -21,6 +21,7 @@ from training.losses import (
     masked_mean,
     pixel_weights,
     sigma_term,
+    thin_things,
 )
 from training.networks.depth_network import DepthOutput
 from training.normalization import FOCAL_REFERENCE_PX
@@ -83,9 +84,42 @@ def test_sky_counts_less_and_what_is_near_more() -> None:
     # Seen with twice the reference's focal length a pixel's inverse depth is twice as large.
     truth = torch.log(2.0 / depth_m)[None, None, None]
     batch = batch_of(truth, sky, 2.0 * FOCAL_REFERENCE_PX)
-    assert pixel_weights(batch, LossWeights(near=1.5, far=0.2)).flatten().tolist() == pytest.approx(
+    assert pixel_weights(batch, LossWeights(near=1.5, thin=1.0, far=0.2)).flatten().tolist() == pytest.approx(
         [1.5, 1.0, 0.2]
     )
+
+
+def test_poles_and_wires_are_thin_and_walls_and_ground_are_not() -> None:
+    depth_m = torch.full((192, 384), 18.0)
+    depth_m[120:] = (144.0 / torch.arange(1.0, 73.0)).clamp_max(18.0)[:, None]  # the ground
+    depth_m[:60, 200:] = 200.0  # the sky
+    depth_m[:120, 40:43] = 6.0  # a pole
+    depth_m[30:32, 200:] = 9.0  # a wire before the sky
+    depth_m[20:100, 100:150] = 8.0  # a wall
+    thin = thin_things(-torch.log(depth_m)[None, None])[0, 0]
+    expected = torch.zeros_like(thin)
+    expected[:120, 40:43] = True
+    expected[30:32, 200:] = True
+    assert torch.equal(thin, expected)
+
+
+def test_thin_is_a_share_of_the_picture() -> None:
+    depth_m = torch.full((64, 640), 18.0)
+    depth_m[:, 100:110] = 6.0
+    truth = -torch.log(depth_m)[None, None]
+    assert int(thin_things(truth).sum()) == 64 * 10
+    assert not thin_things(truth[..., :384]).any()
+
+
+def test_what_is_thin_and_near_counts_most() -> None:
+    depth_m = torch.full((64, 128), 19.0)
+    depth_m[:, 20] = 5.0
+    depth_m[:, 80:] = 90.0
+    depth_m[:, 100] = 40.0
+    truth = torch.log(1.0 / depth_m)[None, None]
+    sky = torch.zeros_like(truth, dtype=torch.bool)
+    weight = pixel_weights(batch_of(truth, sky), LossWeights(near=1.5, thin=8.0))[0, 0, 0]
+    assert weight[[10, 20, 90, 100]].tolist() == pytest.approx([1.5, 12.0, 1.0, 1.0])
 
 
 def test_metres_count_more_where_a_hint_tells_them(truth: Tensor) -> None:
