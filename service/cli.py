@@ -112,6 +112,7 @@ COMMANDS = {
     "export": Command(
         "training.commands", "export", "Write a trained network as ONNX with its card.", "train"
     ),
+    "card": Command("training.card_command", "card", "Write a network's errors into its card.", "train"),
     "blend": Command("training.blend_command", "blend", "Take the mean of several runs' weights.", "train"),
     "quantize": Command("training.quantize_command", "quantize", "Write a network's 8-bit file.", "train"),
 }

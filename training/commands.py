@@ -5,14 +5,13 @@ Heavy packages are imported when a command runs, so that its help is fast.
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from training.errors import EvaluationError, ExportError
+from training.errors import ExportError
 from training.evaluation_command import evaluate
 from training.extras import needs_extra
 from training.train_command import train
@@ -36,10 +35,6 @@ def export(
         Path, typer.Option(help="Checkpoint of `uavdepth train` or of `uavdepth train-video`.")
     ] = DEFAULT_CHECKPOINT,
     name: Annotated[str, typer.Option(help="Name of the network, for status and records.")] = DEFAULT_NAME,
-    measured: Annotated[
-        Path | None,
-        typer.Option(help="Result of `uavdepth evaluate --json` whose errors go into the card."),
-    ] = None,
     size: Annotated[
         str | None, typer.Option(help="Input as WIDTHxHEIGHT; that of the run's last phase if not given.")
     ] = None,
@@ -69,20 +64,19 @@ def export(
 
     wanted = _parsed_size(size)
     if is_checkpoint_of(checkpoint, FROM_VIDEO):
-        if calibrate is not None or measured is not None or further_data:
+        if calibrate is not None or further_data:
             raise ExportError(
-                f"{checkpoint} is of train-video: --calibrate, --measured and --further-data are not for it"
+                f"{checkpoint} is of train-video: --calibrate and --further-data are not for it"
             )
         _tell(_export_video(checkpoint, output, name, wanted), output)
         return
-    errors = _measured_errors(measured) if measured is not None else {}
     run = Checkpoint.load(checkpoint)
-    factor = 1.0
+    measured, factor = {}, 1.0
     if calibrate is not None:
         found = _calibrated(run, wanted, name, calibrate, calibration_seeds)
-        errors["sigma_calibration"], factor = found.as_json(), found.factor
+        measured["sigma_calibration"], factor = found.as_json(), found.factor
         typer.echo(f"sigma is multiplied by {factor:.3f}, from {found.frames} frames of {found.data}")
-    _tell(export_checkpoint(run, output, name, errors, wanted, factor, further_data), output)
+    _tell(export_checkpoint(run, output, name, measured, wanted, factor, further_data), output)
 
 
 def _export_video(checkpoint: Path, output: Path, name: str, size: tuple[int, int] | None) -> ModelCard:
@@ -127,14 +121,3 @@ def _parsed_size(text: str | None) -> tuple[int, int] | None:
     if not all(side.isascii() and side.isdigit() for side in (width, height)):
         raise ExportError(f"size is {text!r}: WIDTHxHEIGHT is needed, as 640x320")
     return int(width), int(height)
-
-
-def _measured_errors(path: Path) -> dict[str, Any]:
-    """The part of an evaluation that belongs into a model card."""
-    try:
-        result = json.loads(path.read_text(encoding="utf-8"))
-        return dict(result["summary"])
-    except FileNotFoundError as error:
-        raise EvaluationError(f"no result of an evaluation at {path}") from error
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise EvaluationError(f"{path} is not a result of `uavdepth evaluate --json`: {error!r}") from error

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,11 +17,10 @@ from training.commands import export
 from training.data.batches import network_image
 from training.data.hint_sampling import hint_maps
 from training.data.views import View
-from training.errors import CheckpointError, EvaluationError, ExportError
+from training.errors import CheckpointError, ExportError
 from training.export import export_checkpoint
 from training.half_weights import SMALLEST_HALVED, rounded_network
 from training.normalization import MAX_DEPTH_M, depth_from_output
-from training.settings import SizePhase
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
 from uavdepth.model.depth_model import DepthModel
@@ -154,45 +151,9 @@ def test_nothing_of_the_training_machine_is_in_the_file(exported: Path) -> None:
         assert trace not in content
 
 
-def test_the_command_writes_measured_errors_into_the_card(
-    checkpoint: Checkpoint, exported: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # Tracing the graph takes most of an export's time; this one is of a calibrated network.
-    monkeypatch.setattr(training.export, "_to_onnx", lambda network, card: onnx.load(exported))
-    monkeypatch.setattr(training.export, "_check_same_output", lambda network, path: None)
-    settings = replace(checkpoint.settings, phases=(SizePhase(1.0, *SIZE, 2),))
-    checkpoint = replace(checkpoint, settings=settings)
-    checkpoint.save(tmp_path / "checkpoint.pt")
-    (tmp_path / "errors.json").write_text(json.dumps({"summary": {"frames": 7}}))
-    export(
-        tmp_path / "out.onnx",
-        checkpoint=tmp_path / "checkpoint.pt",
-        name="narrow",
-        measured=tmp_path / "errors.json",
-    )
-    assert DepthModel.load(tmp_path / "out.onnx", provider="cpu").card.measured == {"frames": 7}
-
-
-@pytest.mark.parametrize("text", [None, "{", "{}", "[]"])
-def test_errors_that_were_not_measured_are_refused(
-    checkpoint: Checkpoint, tmp_path: Path, text: str | None
-) -> None:
-    checkpoint.save(tmp_path / "checkpoint.pt")
-    if text is not None:
-        (tmp_path / "errors.json").write_text(text)
-    with pytest.raises(EvaluationError, match=r"errors\.json"):
-        export(
-            tmp_path / "out.onnx",
-            checkpoint=tmp_path / "checkpoint.pt",
-            name="narrow",
-            measured=tmp_path / "errors.json",
-        )
-    assert not (tmp_path / "out.onnx").exists()
-
-
 def test_a_missing_checkpoint_writes_nothing(tmp_path: Path) -> None:
     with pytest.raises(CheckpointError, match=r"none\.pt"):
-        export(tmp_path / "out.onnx", checkpoint=tmp_path / "none.pt", name="narrow", measured=None)
+        export(tmp_path / "out.onnx", checkpoint=tmp_path / "none.pt", name="narrow")
     assert list(tmp_path.iterdir()) == []
 
 
