@@ -18,7 +18,8 @@ class MotionSettings(Section):
         title="Measure points",
         description="Follows corners from picture to picture and measures their distance by the way that the "
         "vehicle went; takes 6 to 9 ms of one core a picture. They give metres, together with the height or "
-        "instead of it, while the vehicle moves and for 2 s after it has stopped.",
+        "instead of it, while the vehicle moves, in a hover while they stay in view, and for 2 s without "
+        "either.",
     )
     attitude_sigma_deg: float = Field(
         default=0.5,

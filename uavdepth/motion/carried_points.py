@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from uavdepth.camera import CameraModel, CameraMount
 from uavdepth.model.hints import PointHints
+from uavdepth.motion.resection import Resection
 from uavdepth.motion.vehicle_motion import VehicleMotion
 
 MOST_POINTS = 300
@@ -17,6 +18,9 @@ _GROWTH_PER_S = 0.15
 _LOST_GROWTH_PER_S = 0.4
 """The same for one that is not followed any more: what is at its pixel now may be another thing."""
 
+_SEEN_GROWTH_PER_S = 0.005
+"""What one gains that is seen where it should be, added up: corners creep along edges. After a minute of
+hover nothing is sure enough any more."""
 
 _PROVEN = 4
 """Measurements after which a point that is lost is carried on. Most of those that are lost sooner were no
@@ -28,7 +32,7 @@ class CarriedPoints:
 
     Args:
         camera: that sees them.
-        carry_s: how long a point lasts after it was measured, seconds.
+        carry_s: how long a point lasts after it was measured, or seen where it should be, seconds.
     """
 
     def __init__(self, camera: CameraModel, carry_s: float) -> None:
@@ -95,6 +99,29 @@ class CarriedPoints:
     def drop(self, ids: NDArray[np.int64]) -> None:
         """Forget the points of these tracks."""
         self._keep(~np.isin(self._ids, ids))
+
+    def followed(
+        self, live_ids: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.intp], NDArray[np.float64], float]:
+        """The points whose tracks live.
+
+        Returns:
+            (N,) their tracks' numbers, (N,) where those stand among `live_ids`, (N, 3) the points in the
+            camera's axes, and the median standard deviation in metres of how far the vehicle went since they
+            were measured; 0 without points.
+        """
+        ids, ours, theirs = np.intersect1d(self._ids, live_ids, assume_unique=True, return_indices=True)
+        drift_m = float(np.median(self._offset_sigma[ours])) if len(ids) else 0.0
+        return ids, theirs, self._points[ours], drift_m
+
+    def confirm(self, ids: NDArray[np.int64], found: Resection, now_ns: int) -> None:
+        """Move all points as they are seen to have moved; those of `ids` were seen where they should be."""
+        self._points = self._points @ found.rotation.T + found.offset_m
+        seen = np.isin(self._ids, ids)
+        growth = _SEEN_GROWTH_PER_S * (now_ns - self._measured_ns) * 1e-9
+        self._sigma = self._sigma + np.where(seen, growth, 0.0)
+        self._offset_sigma = np.where(seen, found.offset_sigma_m, self._offset_sigma)
+        self._measured_ns = np.where(seen, now_ns, self._measured_ns)
 
     def hints(
         self,

@@ -15,6 +15,7 @@ from uavdepth.errors import ImageSizeError
 from uavdepth.model.hints import PointHints
 from uavdepth.motion.carried_points import CarriedPoints
 from uavdepth.motion.feature_tracks import MOST_FRAMES, FeatureTracks
+from uavdepth.motion.resection import resect
 from uavdepth.motion.triangulation import triangulate
 from uavdepth.motion.turn_check import TurnCheck
 from uavdepth.motion.vehicle_motion import CameraMotion, VehicleMotion
@@ -28,6 +29,15 @@ _LONGEST_GAP_NS = 500_000_000
 
 _BASELINE_SIGMAS = 3.0
 """In hover the baseline does not stand out of its own noise, and there is no depth."""
+
+_SLOW_SIGMAS = 6.0
+"""A baseline up to so many measures only what is near; the rest is looked for where it was."""
+
+_LEAST_DRIFT_M = 0.02
+"""However short the time, so far the camera may have moved otherwise than was said."""
+
+_SEEN_SIGMA_PX = 0.5
+"""Where a corner is seen, long after it was found; of a picture at most 640 wide."""
 
 _LEAST_TRACKS_OF_TURN = 30
 """Fewer do not tell how far a picture turned."""
@@ -55,7 +65,8 @@ class MotionPointSettings:
         largest_residual: largest re-projection error (root mean square), in standard deviations.
         nearest_m, farthest_m: depths that are believed.
         model_sigma: relative error of depth that noise does not explain: calibration, mount, time stamps.
-        carry_s: how long a point that is not measured any more is carried along.
+        carry_s: how long a point is carried along that is neither measured any more nor, in a hover, seen
+            where it should be.
     """
 
     pixel_sigma: float = 0.3
@@ -79,7 +90,8 @@ class MotionPoints:
     been sent: its points are those measured up to the picture before it, carried along with the vehicle to
     where their corners are seen now.
 
-    Nothing comes of a hover but points that were measured before; of flight along the optical axis
+    Nothing comes of a hover but points that were measured before: they last while they are followed and
+    most of them are seen where the vehicle's motion puts them. Of flight along the optical axis comes
     nothing near the point it heads for. Objects that move are told by residuals across their epipolar
     lines; one that moves along them (a car ahead on one's own course) is not told from a thing that
     stands at another depth.
@@ -168,9 +180,14 @@ class MotionPoints:
         is_due = self._measured_ns is None or captured_ns - self._measured_ns >= _MEASURED_EVERY_NS
         if motion is not None and is_due and len(self._tracks.ids):
             views = self._views(captured_ns, motion)
+            # How far the baselines stand out of their noise, together the largest.
+            stands_out = max((moved.baseline_m / moved.sigma_m for _, moved in views), default=math.inf)
             if views:
                 self._measured_ns = captured_ns
+            if views and stands_out > _BASELINE_SIGMAS:
                 self._measure(captured_ns, motion, views)
+            if stands_out <= _SLOW_SIGMAS:
+                self._confirm(captured_ns, motion)
         self._tracks.renew()
 
     def _follow(self, image_bgr: NDArray[np.uint8], captured_ns: int, motion: VehicleMotion) -> None:
@@ -208,9 +225,7 @@ class MotionPoints:
             moved = motion.between(captured_ns, self._times[row], self.mount)
             if moved is not None:
                 chosen.append((row, moved))
-        if any(moved.baseline_m > _BASELINE_SIGMAS * moved.sigma_m for _, moved in chosen):
-            return chosen
-        return []
+        return chosen
 
     def _measure(
         self, captured_ns: int, motion: VehicleMotion, views: list[tuple[int, CameraMotion]]
@@ -242,6 +257,21 @@ class MotionPoints:
         self._carried.put(self._tracks.ids[several[good]], points, relative[good], captured_ns)
         # A track that does not fit a still world is not one of its points, whatever it was before.
         self._carried.drop(self._tracks.ids[several[found.residual > settings.largest_residual]])
+
+    def _confirm(self, captured_ns: int, motion: VehicleMotion) -> None:
+        """See whether points that were measured earlier are where they were."""
+        ids, tracks, points, drift_m = self._carried.followed(self._tracks.ids)
+        pixel = float(self._scale[0]) / self.camera.fx
+        found = resect(
+            points,
+            self._rays(self._tracks.positions[-1][tracks]),
+            _SEEN_SIGMA_PX * pixel,
+            math.hypot(drift_m, _LEAST_DRIFT_M),
+            motion.noise.attitude_rad,
+        )
+        if found is not None:
+            self._carried.confirm(ids[found.agrees], found, captured_ns)
+            self._carried.drop(ids[~found.agrees])
 
     def _pixels(self, small: NDArray[np.float32]) -> NDArray[np.float64]:
         return np.asarray((small.astype(np.float64) + 0.5) * self._scale - 0.5)
