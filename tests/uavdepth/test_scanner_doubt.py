@@ -36,7 +36,8 @@ class TestDoubt:
     def test_a_pole_on_either_side_of_straight_behind_is_found_and_doubted(self, camera, level, bearing):
         rear = CameraMount(yaw_deg=180.0)
         depth = depth_of([pole(bearing, 6.0, 0.05)], camera, rear, level)
-        scan = ObstacleScanner(camera, rear).scan(depth, level, None, np.full_like(depth, 0.25))
+        scanner = ObstacleScanner(camera, rear, sigma_factor=1.0)
+        scan = scanner.scan(depth, level, None, np.full_like(depth, 0.25))
         assert obstacles(scan) == [element(180)]
         assert scan.distance_m[element(180)] == pytest.approx(0.75 * 6.0, rel=0.03)
 

@@ -90,11 +90,13 @@ class TestCaution:
 
     def test_a_little_beyond_is_told_where_it_may_begin(self, camera, mount, level):
         depth = depth_of([wall(21)], camera, mount, level)
-        scan = ObstacleScanner(camera, mount).scan(depth, level, None, np.full(depth.shape, 0.4))
+        scan = ObstacleScanner(camera, mount, sigma_factor=1.0).scan(
+            depth, level, None, np.full(depth.shape, 0.4)
+        )
         assert scan.distance_m[element(0)] == pytest.approx(0.75 * 21.0, rel=0.03)
 
-    def test_a_way_is_freed_by_half_as_much_doubt_again_as_shortens(self, camera, mount, level):
-        for factor, sigma, state in ((0.75, 0.28, CLEAR), (0.75, 0.31, OBSTACLE), (0.4, 0.5, CLEAR)):
+    def test_a_way_is_freed_by_three_times_the_doubt_that_shortens(self, camera, mount, level):
+        for factor, sigma, state in ((0.375, 0.28, CLEAR), (0.375, 0.31, OBSTACLE), (0.2, 0.5, CLEAR)):
             scanner = ObstacleScanner(camera, mount, sigma_factor=factor)
             scan = scanner.scan(*self.far_wall(camera, mount, level, sigma))
             assert scan.state[element(0)] == state

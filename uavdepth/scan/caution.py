@@ -11,7 +11,7 @@ LARGEST_SHORTENING = 0.25
 """However doubtful a distance, at most so much of it is taken off: an obstacle at no distance at all would
 stop the vehicle for good."""
 
-FREEING_FACTOR = 1.5
+FREEING_FACTOR = 3.0
 """A way is freed by so many times the standard deviations that distances are shortened by: what is nearest in
 an element has erred towards the vehicle already, what is taken for free has not (docs/flight-evaluation.md).
 """

@@ -102,7 +102,7 @@ class ObstacleScanner:
         above_m: float = 1.5,
         min_pixels: int | None = None,
         ground_tolerance: float = GROUND_DEPTH_SHARE,
-        sigma_factor: float = 1.0,
+        sigma_factor: float = 0.5,
         mask: NDArray[np.bool_] | None = None,
         max_ground_slope_deg: float = 15.0,
         max_relative_sigma: float = 0.5,
