@@ -38,10 +38,13 @@ def update_card(
         The files that were written.
 
     Raises:
-        ExportError: a file without a card inside, or an 8-bit file of another network: nothing is written.
+        ExportError: a file without a card inside, an 8-bit file alone, or one of another network: nothing is
+            written.
         ModelCardError: a card that cannot be read.
     """
     network, card = _read(path)
+    if _property(network, SOURCE_METADATA_KEY) is not None:
+        raise ExportError(f"{path} is an 8-bit file: name the network that it was made from")
     beside = int8_beside(path)
     second = _read(beside) if beside.is_file() else None
     if second is not None and _property(second[0], SOURCE_METADATA_KEY) != digest(path):

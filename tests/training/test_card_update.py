@@ -76,6 +76,13 @@ def test_an_8_bit_file_of_another_network_is_not_adopted(network: Path) -> None:
         DepthModel.load(network, "cpu", 1, precision="int8")
 
 
+def test_an_8_bit_file_alone_is_not_updated(network: Path) -> None:
+    before = int8_beside(network).read_bytes()
+    with pytest.raises(ExportError, match="is an 8-bit file: name the network"):
+        update_card(int8_beside(network), effort="more")
+    assert int8_beside(network).read_bytes() == before
+
+
 def test_a_file_without_a_card_is_refused(network: Path) -> None:
     graph = onnx.load(str(network))
     onnx.helper.set_model_props(graph, {})
