@@ -20,6 +20,9 @@ from training.normalization import FOCAL_REFERENCE_PX
 NEAR_TRUTH_M = 20.0
 """Depth within which obstacles count most: a vehicle at 10 m/s needs that much to stop."""
 
+THIN_END_M = 100.0
+"""Depth from which on a thin thing counts like anything else."""
+
 FAR_UNCERTAINTY = 0.35
 """Relative error that sky counts with when sigma is taught: "at least 200 m" is no distance, and this is how
 uncertain a network may well be that is sure of the sky."""
@@ -42,9 +45,10 @@ class LossWeights:
         uncorrected: of the prediction before the points corrected it.
         far: of a pixel of sky within the terms that use them.
         near: of a pixel nearer than `NEAR_TRUTH_M`; others count 1.
-        thin: times `near`, of a pixel of a near pole, wire, twig or railing: one pixel in a hundred, and most
+        thin: times the above, of a pixel of a pole, wire, twig or railing: one pixel in a hundred, and most
             of the scan's missed elements. A network that is not sure whether a pixel is of the twig or of
-            the wood behind has to choose the twig.
+            the wood behind has to choose the twig. It falls to 1 between `NEAR_TRUTH_M` and `THIN_END_M`:
+            where it ended at once, thin things beyond were told too near.
         hinted: of a picture with any hint in the absolute terms; one without counts 1, because its metres
             can only be guessed.
         sigma_quantile: share of errors that are to be below sigma: 0.683 as for a normal distribution, and
@@ -104,9 +108,10 @@ def depth_loss(output: DepthOutput, batch: Batch, weights: LossWeights) -> LossT
 def pixel_weights(batch: Batch, weights: LossWeights) -> Tensor:
     """(N, 1, H, W) how much each pixel counts."""
     depth_m = torch.exp(-batch.log_inverse_depth) * (batch.focal_px / FOCAL_REFERENCE_PX)[:, None, None, None]
-    near = torch.where(thin_things(batch.log_inverse_depth), weights.near * weights.thin, weights.near)
-    weight = torch.where(depth_m < NEAR_TRUTH_M, near, 1.0)
-    return torch.where(batch.far, weights.far, weight)
+    near = torch.where(depth_m < NEAR_TRUTH_M, weights.near, 1.0)
+    nearness = (torch.log(THIN_END_M / depth_m) / math.log(THIN_END_M / NEAR_TRUTH_M)).clamp(0.0, 1.0)
+    thin = torch.where(thin_things(batch.log_inverse_depth), weights.thin**nearness, 1.0)
+    return torch.where(batch.far, weights.far, near * thin)
 
 
 def thin_things(log_inverse_depth: Tensor) -> Tensor:

@@ -42,7 +42,10 @@ def train(
     images: Annotated[int | None, typer.Option(help="Length of the run in pictures shown.")] = None,
     init: Annotated[
         Path | None,
-        typer.Option(help="Checkpoint of another run to start from, wherever its weights fit."),
+        typer.Option(
+            help="Checkpoint of another run to start from, wherever its weights fit, or a network that flies "
+            "(.onnx, not in 8 bits)."
+        ),
     ] = None,
     fine_tune: Annotated[
         bool,

@@ -14,12 +14,17 @@ from training.averaging import AverageWeights
 from training.checkpoint import Checkpoint, read_weights
 from training.data.batches import Batch, BatchRequest, BatchSource, FramePool
 from training.errors import CheckpointError, TrainingDataError
+from training.exported_weights import take_exported
 from training.losses import LossTerms, depth_loss
 from training.networks.depth_network import DepthNetwork
 from training.precision import autocast, resolve_precision
 from training.settings import TrainingSettings
 
 RESCAN_EVERY_STEPS = 100
+EXPORTED_SUFFIX = ".onnx"
+STATISTICS_BATCHES = 24
+"""That the normalisations of an exported network get their statistics from."""
+
 _BATCHES_AHEAD = 2
 
 
@@ -86,14 +91,18 @@ class Trainer:
         return trainer
 
     def start_from(self, path: Path) -> int:
-        """Take over the weights of another run's checkpoint wherever name and shape fit.
+        """Take over the weights of another run's checkpoint wherever name and shape fit, or of an export.
 
         Returns:
             How many of the network's weights were found there.
 
         Raises:
-            CheckpointError: a file that is no checkpoint, or none of whose weights fits.
+            CheckpointError: a file that is neither, or none of whose weights fits.
         """
+        if path.suffix == EXPORTED_SUFFIX:
+            taken = take_exported(path, self.network, map(self._source.make, self._statistics_requests()))
+            self._average = AverageWeights(self.network, self.settings.average_decay)
+            return taken
         weights = read_weights(path)
         state = self.network.state_dict()
         fitting = {
@@ -162,6 +171,12 @@ class Trainer:
             size = self.settings.size_of(number, progress)
             yield BatchRequest(number, size.batch, size.width, size.height)
             number, images = number + 1, images + size.batch
+
+    def _statistics_requests(self) -> Iterator[BatchRequest]:
+        """The first batches of the last phase."""
+        size = self.settings.phases[-1]
+        for number in range(STATISTICS_BATCHES):
+            yield BatchRequest(number, size.batch, size.width, size.height)
 
     def _learn(self, batch: Batch, factor: float) -> LossTerms:
         for group in self._optimizer.param_groups:

@@ -47,6 +47,9 @@ def evaluate_flight(
         float | None,
         typer.Option(min=0.0, max=5.0, help="As `[scan] sigma_factor`; its default if left out."),
     ] = None,
+    validation: Annotated[
+        bool, typer.Option("--validation", help="In worlds kept for choices instead of those of tests.")
+    ] = False,
     plots: Annotated[Path | None, typer.Option(help="Folder for plots (needs matplotlib).")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
@@ -80,6 +83,7 @@ def evaluate_flight(
         latency_s=latency_ms / 1000.0,
         seed=seed,
         sigma_factor=sigma_factor,
+        validation=validation,
     )
     plan = quickly(plan) if quick else plan
     plan = plan.changed(approaches=approaches, corridors=corridors, poses=poses)

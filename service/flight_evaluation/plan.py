@@ -26,6 +26,7 @@ class EvaluationPlan:
         turns: flights a scene in which bearings are measured.
         worlds: worlds of each scene: as drawn, under a low sun, in haze.
         sigma_factor: `[scan] sigma_factor`; None: its default.
+        validation: in worlds that choices are made by, not in those of tests.
     """
 
     scenes: tuple[str, ...] = DEFAULT_SCENES
@@ -41,6 +42,7 @@ class EvaluationPlan:
     turns: int = 2
     worlds: int = 3
     sigma_factor: float | None = None
+    validation: bool = False
 
     def changed(
         self, approaches: int | None = None, corridors: int | None = None, poses: int | None = None

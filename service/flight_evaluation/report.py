@@ -47,6 +47,7 @@ def report(evaluation: Evaluation, machine: str, date: str, model: str) -> dict[
         "picture": f"{camera.width}x{camera.height}",
         "frames_per_s": camera.fps,
         "speed_of_approaches_mps": 3.0,
+        "seeds": "validation" if plan.validation else "test",
         "worlds": [str(light) for light in _lights(evaluation)],
         "scenes": scenes,
         "all": everything,

@@ -13,7 +13,7 @@ def render_report(result: dict[str, Any]) -> RenderableType:
     """The tables of `report.report`'s result."""
     heading = (
         f"{result['model']}, {result['machine']}, {result['date']}; pictures {result['picture']}, "
-        f"{result['frames_per_s']:g} a second, latency {result['latency_ms']} ms"
+        f"{result['frames_per_s']:g} a second, latency {result['latency_ms']} ms; {result['seeds']} worlds"
     )
     parts: list[RenderableType] = [Text(heading)]
     rows = {**result["scenes"], "all": result["all"]}

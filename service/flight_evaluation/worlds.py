@@ -22,6 +22,11 @@ KNOWN_SCENES = (*SCENE_NAMES, WIRES)
 FIRST_TEST_SEED = 1000
 """No network is trained on, or chosen by, worlds of this seed or above."""
 
+_FIRST_FLOWN_TEST_SEED = FIRST_TEST_SEED + 100
+
+_FIRST_FLOWN_VALIDATION_SEED = 950
+"""Seeds 900 to 999 are for choices, of networks and of settings; those below this for single pictures."""
+
 _LOW_SUN_ELEVATION_DEG = 8.0
 _LOW_SUN_BGR, _LOW_AMBIENT_BGR = (0.55, 0.82, 1.15), (0.40, 0.35, 0.33)
 _HAZE_PER_M = 0.03
@@ -78,6 +83,7 @@ def lit(description: SceneDescription, light: Light) -> SceneDescription:
     return description
 
 
-def specs_of(name: str) -> tuple[WorldSpec, ...]:
-    """The worlds of one scene: a seed for each light."""
-    return tuple(WorldSpec(name, FIRST_TEST_SEED + 100 + i, light) for i, light in enumerate(Light))
+def specs_of(name: str, validation: bool = False) -> tuple[WorldSpec, ...]:
+    """The test worlds of one scene, or its validation worlds: a seed for each light."""
+    first = _FIRST_FLOWN_VALIDATION_SEED if validation else _FIRST_FLOWN_TEST_SEED
+    return tuple(WorldSpec(name, first + i, light) for i, light in enumerate(Light))

@@ -135,6 +135,12 @@ class TestWorlds:
         assert {spec.light for spec in specs} == set(Light)
         assert min(spec.seed for spec in specs) >= 1000
 
+    def test_choices_are_made_in_other_worlds_than_tests(self) -> None:
+        for name in DEFAULT_SCENES:
+            specs = specs_of(name, validation=True)
+            assert {spec.light for spec in specs} == set(Light)
+            assert all(900 <= spec.seed < 1000 for spec in specs)
+
     def test_wires_stand_across_the_way_in_the_height_band(self) -> None:
         scene = WorldSpec("wires", 1100).load()
         heights = np.arange(1.0, 5.5, 0.01)
@@ -195,7 +201,7 @@ class TestCommand:
             main(["evaluate-flight", *words, "--approaches", "0", "--corridors", "0", "--json"])
         assert end.value.code == 0
         told = json.loads(capsys.readouterr().out)
-        assert told["sigma_factor"] == 1.5
+        assert (told["sigma_factor"], told["seeds"]) == (1.5, "test")
         wires = told["scenes"]["wires"]
         assert wires["depth"] == "true"
         assert wires["pictures"] > 10
