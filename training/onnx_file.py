@@ -11,6 +11,7 @@ from typing import Any, cast
 
 import onnx
 import torch
+from onnx_ir.passes.common import DeduplicateInitializersPass
 from torch import Tensor, nn
 
 from uavdepth.model.card import CARD_METADATA_KEY, ModelCard
@@ -33,6 +34,7 @@ def trace(
             dynamo=True,
             verbose=False,
         )
+    DeduplicateInitializersPass()(cast(Any, program).model)
     model = cast(onnx.ModelProto, cast(Any, program).model_proto)
     strip_traces(model)
     return model

@@ -11,7 +11,7 @@ import torch
 from training.errors import PretrainedWeightsError
 from training.networks.aggregation import AggregationGrid, AggregationNode, LightAggregationNode
 from training.networks.attention import EfficientChannelAttention, eca_kernel_size
-from training.networks.blocks import ConvNormRelu, replicate_border
+from training.networks.blocks import ConvNormRelu, replicate_border, upsample
 from training.networks.decoder import DecoderStage
 from training.networks.depth_network import DepthNetwork, NetworkShape
 from training.networks.encoder import BATCH_NORM_EPSILON, ENCODER_CHANNELS, Conv, EfficientNetLite0
@@ -130,6 +130,18 @@ def test_a_node_fuses_a_map_with_the_next_deeper_one(node: type[torch.nn.Module]
     assert fused.shape == level.shape
     assert not torch.allclose(fused, fuse(level, deeper + 1.0))
     assert not torch.allclose(fused, fuse(level + 1.0, deeper))
+
+
+@pytest.mark.parametrize("channels", [1, 2, 3])
+def test_a_map_is_enlarged_bilinearly_however_many_channels_it_has(channels: int) -> None:
+    features = torch.randn(2, channels, 5, 7, requires_grad=True)
+    wanted = torch.nn.functional.interpolate(features, scale_factor=2.0, mode="bilinear", align_corners=False)
+    with torch.autocast("cpu", torch.bfloat16):
+        enlarged = upsample(features)
+    torch.testing.assert_close(enlarged, wanted)
+    enlarged.sum().backward()
+    assert features.grad is not None
+    torch.testing.assert_close(features.grad, torch.full_like(features, 4.0))
 
 
 def test_the_deepest_map_reaches_the_finest_level_through_the_grid() -> None:

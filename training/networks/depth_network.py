@@ -95,6 +95,15 @@ class DepthNetwork(nn.Module):
             ground: (N, 1, H, W) q of the flat ground (`uavdepth.model.hint_planes`), 0 where there is none.
             points: (N, 2, H, W) q of measured points and the confidence in them, 0 where there is none.
         """
+        half = self.at_half_size(image, ground, points)
+        return DepthOutput(
+            upsample(half.log_inverse_depth), upsample(half.log_sigma), upsample(half.uncorrected)
+        )
+
+    def at_half_size(
+        self, image: Tensor, ground: Tensor | None = None, points: Tensor | None = None
+    ) -> DepthOutput:
+        """The same before it is brought to the picture's size, (N, 1, H/2, W/2) each: what is exported."""
         size = (image.shape[0], 1, *image.shape[2:])
         ground = image.new_zeros(size) if ground is None else ground
         points = image.new_zeros((size[0], 2, *size[2:])) if points is None else points
@@ -110,4 +119,4 @@ class DepthNetwork(nn.Module):
         features = self.decoder(pyramid, self.aggregation(pyramid))
         predicted = self.depth_head(features).float()
         corrected, log_sigma = self.correction(features, predicted, hints)
-        return DepthOutput(upsample(corrected), upsample(log_sigma), upsample(predicted))
+        return DepthOutput(corrected, log_sigma, predicted)

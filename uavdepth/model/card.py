@@ -83,6 +83,8 @@ class ModelCard(BaseModel):
         relative_inverse_depth:  scale / output              scale unknown, another for each picture
         affine_inverse_depth:    1 / (scale * output + shift)   both unknown, others for each picture
 
+    A log_inverse_depth smaller than the input is enlarged to its size, bilinear, and so is its uncertainty.
+
     Without `focal_px` the factor in front is 1: the output does not depend on the camera.
 
     The second output, where `uncertainty` is true, is log of sigma / depth, in the same layout.

@@ -116,14 +116,16 @@ class DepthModel:
             inputs.update(self._planes(hints or Hints(), camera))
         outputs = self._session.run(self._output_names, inputs)
 
-        values = self._rows_and_columns(outputs[0])
+        enlarged_to = (width, height) if self.card.output == "log_inverse_depth" else (0, 0)
+        values = _enlarged(self._rows_and_columns(outputs[0]), enlarged_to)
         if self.card.output == "affine_inverse_depth":
             values = np.where(np.isfinite(values), values, np.float32(np.nan))
             return DepthMap.from_affine(_to_pixels_of(camera, values))
         sigma = None
         if self.card.uncertainty:
             with np.errstate(over="ignore"):
-                sigma = np.exp(self._rows_and_columns(outputs[1]), dtype=np.float32)
+                logs = _enlarged(self._rows_and_columns(outputs[1]), enlarged_to)
+                sigma = np.exp(logs, dtype=np.float32)
         if sigma is not None and self.card.output == "log_inverse_depth" and "points" in self.card.hints:
             values = fit_to_points(values, sigma, inputs[self.card.points_name][0])
         depth = _to_pixels_of(camera, self._depth(values, camera.fx * width / camera.width))
@@ -208,6 +210,13 @@ def _check_picture(image_bgr: NDArray[np.uint8], camera: CameraModel) -> None:
         raise ImageSizeError(
             f"the picture is {shape[1]}x{shape[0]} pixels, the camera is {camera.width}x{camera.height}"
         )
+
+
+def _enlarged(logs: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
+    """A smaller map at (width, height), bilinear: the last step of a network that was taught with it."""
+    if logs.shape[1] >= size[0] or logs.shape[0] >= size[1]:
+        return logs
+    return np.asarray(cv2.resize(logs, size, interpolation=cv2.INTER_LINEAR), np.float32)
 
 
 def _to_pixels_of(camera: CameraModel, values: NDArray[np.float32]) -> NDArray[np.float32]:
