@@ -59,6 +59,7 @@ def write_red_network(
     height: int = HEIGHT,
     gain: float = 1.0,
     int8_of: Path | None = None,
+    halved: bool = False,
 ) -> Path:
     """A network whose output is `gain` times its normalised red channel, log sigma a constant.
 
@@ -68,15 +69,20 @@ def write_red_network(
         uncertainty: log of relative sigma, or None for a network without that output.
         width, height: size of the graph's input.
         int8_of: the network that its metadata says it is the 8-bit file of.
+        halved: outputs of half the input's size, the mean of four pixels each.
     """
     picture = helper.make_tensor_value_info("image", TensorProto.FLOAT, [1, 3, height, width])
-    depth = helper.make_tensor_value_info("log_inverse_depth", TensorProto.FLOAT, [1, 1, height, width])
+    size = [1, 1, height // 2, width // 2] if halved else [1, 1, height, width]
+    depth = helper.make_tensor_value_info("log_inverse_depth", TensorProto.FLOAT, size)
     constants = [
         numpy_helper.from_array(np.array([0], dtype=np.int64), "first"),
         numpy_helper.from_array(np.array([gain], dtype=np.float32), "gain"),
     ]
     nodes = [
-        helper.make_node("Gather", ["image", "first"], ["red"], axis=1),
+        helper.make_node("Gather", ["image", "first"], ["red pixels"], axis=1),
+        helper.make_node("AveragePool", ["red pixels"], ["red"], kernel_shape=[2, 2], strides=[2, 2])
+        if halved
+        else helper.make_node("Identity", ["red pixels"], ["red"]),
         helper.make_node("Mul", ["red", "gain"], ["log_inverse_depth"]),
     ]
     outputs = [depth]
@@ -89,7 +95,7 @@ def write_red_network(
             helper.make_node("Mul", ["red", "zero"], ["nothing"]),
             helper.make_node("Add", ["nothing", "sigma"], ["log_sigma"]),
         ]
-        outputs.append(helper.make_tensor_value_info("log_sigma", TensorProto.FLOAT, [1, 1, height, width]))
+        outputs.append(helper.make_tensor_value_info("log_sigma", TensorProto.FLOAT, size))
     graph = helper.make_graph(nodes, "red", [picture], outputs, constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)])
     model.ir_version = 8

@@ -76,6 +76,23 @@ class TestInference:
         # One column of the network straddles the edge; nothing else lies between.
         assert len(np.unique(depth)) <= 3
 
+    def test_smaller_logarithms_are_enlarged_between_pixels_and_metres_are_not(self, tmp_path):
+        """As a network enlarges its own last map; metres half way between two things are of neither."""
+        camera = CameraModel.from_fov(WIDTH, HEIGHT, 90)
+        picture = red(51, WIDTH, HEIGHT)
+        picture[:, 24:, 2] = 204
+        depths = {}
+        for kind in ("log_inverse_depth", "depth"):
+            card = card_values(output=kind, mean=[0.0] * 3, std=[1.0] * 3, uncertainty=True)
+            path = write_red_network(tmp_path / f"{kind}.onnx", card, uncertainty=-1.0, halved=True)
+            answer = DepthModel.load(path, provider="cpu", threads=1).infer(picture, camera)
+            assert answer.depth_m.shape == answer.relative_sigma.shape == (HEIGHT, WIDTH)
+            np.testing.assert_allclose(answer.relative_sigma, math.exp(-1.0), rtol=1e-5)
+            depths[kind] = answer.depth_m / (camera.fx / 40.0)
+        expected = np.exp(-np.array([0.2, 0.2, 0.35, 0.65, 0.8, 0.8]))
+        np.testing.assert_allclose(depths["log_inverse_depth"][5, 21:27], expected, rtol=1e-5)
+        np.testing.assert_allclose(depths["depth"][5, 21:27], [0.2, 0.2, 0.2, 0.8, 0.8, 0.8], rtol=1e-5)
+
     def test_sigma_comes_out_relative(self, tmp_path, camera):
         path = write_red_network(tmp_path / "n.onnx", card_values(uncertainty=True), uncertainty=-2.0)
         result = DepthModel.load(path, provider="cpu", threads=1).infer(red(10), camera)
