@@ -210,10 +210,17 @@ def _is_gentle_ground(scene: Scene, place: Route, ahead_m: float) -> bool:
 def _can_take_off(scene: Scene, place: Route) -> bool:
     """Whether the place is bare ground with room to climb."""
     ground_m = scene.ground_height_m(place.north_m, place.east_m)
-    for up_m in np.arange(_START_CLEARANCE_M + 0.3, place.height_m + 0.6, 0.5):
-        position = (place.north_m, place.east_m, -ground_m - float(up_m))
-        if scene.clearance_m(position) < _START_CLEARANCE_M:
-            return False
+
+    def clearance_m(up_m: float) -> float:
+        return scene.clearance_m((place.north_m, place.east_m, -ground_m - float(up_m)))
+
+    # First past what is low and near, a kerb or a bench, then well away from everything.
+    beside = np.arange(VEHICLE_RADIUS_M + 0.05, _START_CLEARANCE_M + 0.3, 0.1)
+    if any(clearance_m(up_m) < VEHICLE_RADIUS_M + 0.01 for up_m in beside):
+        return False
+    above = np.arange(_START_CLEARANCE_M + 0.3, place.height_m + 0.6, 0.5)
+    if any(clearance_m(up_m) < _START_CLEARANCE_M for up_m in above):
+        return False
     below = scene.rangefinder_m((place.north_m, place.east_m, -ground_m - place.height_m))
     if below is None or abs(below - place.height_m) > 0.1:
         return False
