@@ -81,6 +81,11 @@ class TestRoutes:
         assert find_approaches(open_ground, 3, 1) == []
         assert len(find_corridors(open_ground, 3, 2)) == 2
 
+    def test_nobody_takes_off_beside_a_kerb(self) -> None:
+        """It would touch it on the way up; higher up there is room, and past it the way is free."""
+        kerbs = [(0.0, east_m, 80.0, 0.3, 0.3) for east_m in np.arange(-40.0, 40.0, 0.8)]
+        assert find_corridors(world_with(*kerbs), 3, 1) == []
+
 
 class TestTurning:
     @pytest.mark.parametrize("turned_deg", [0, 10, -10])
