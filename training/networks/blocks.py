@@ -38,9 +38,9 @@ one of 160x80 takes 0.02 ms instead of 0.25 (23 November 2026)."""
 
 def upsample(features: Tensor) -> Tensor:
     """The map at twice its size, bilinear, pixel centres aligned."""
-    if features.shape[1] > FEW_CHANNELS:
+    if features.shape[1] > FEW_CHANNELS or features.device.type != "cpu":
         return functional.interpolate(features, scale_factor=2.0, mode="bilinear", align_corners=False)
-    with torch.autocast(features.device.type, enabled=False):
+    with torch.autocast("cpu", enabled=False):
         features = features.float()
         rows, columns = (_doubling(size, features) for size in features.shape[2:])
         return rows @ (features @ columns.T)
