@@ -50,8 +50,8 @@ _KNOWN_EVERY = 37
 class _TwoOutputs(nn.Module):
     """The network with its outputs as a plain tuple: ONNX knows no dataclasses.
 
-    They stay at half the picture's size; `DepthModel` enlarges them as the network would, in a fifth of the
-    time and in single precision.
+    They stay at half the picture's size; `DepthModel` enlarges them as the network would, in single precision
+    and 0.1 ms, where OpenVINO with AMX took 0.7 ms at 384x192 and 2 ms at 640x320 (23 November 2026).
     """
 
     def __init__(self, network: DepthNetwork, sigma_factor: float = 1.0) -> None:
