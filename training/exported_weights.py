@@ -21,6 +21,7 @@ from training.errors import CheckpointError
 from training.half_weights import restore_single
 from training.networks.blocks import ConvNormRelu
 from training.networks.depth_network import DepthNetwork
+from uavdepth.model.int8_file import SOURCE_METADATA_KEY
 
 _PREFIX = "network."
 """Of the weights' names in an exported file."""
@@ -38,7 +39,7 @@ def take_exported(path: Path, network: DepthNetwork, batches: Iterable[Batch]) -
         How many numbers were taken over.
 
     Raises:
-        CheckpointError: no such file, none of this program, or one of another network.
+        CheckpointError: no such file, one in 8 bits, none of this program, or one of another network.
     """
     folded = _read(path)
     numbers = sum(value.numel() for value in folded.values())
@@ -68,6 +69,8 @@ def _read(path: Path) -> dict[str, Tensor]:
         model = onnx.load(str(path))
     except Exception as error:  # protobuf's own errors have no common class that is public
         raise CheckpointError(f"{path} is no ONNX file: {error}") from error
+    if any(entry.key == SOURCE_METADATA_KEY for entry in model.metadata_props):
+        raise CheckpointError(f"{path} is an 8-bit file: name the network that it was made from")
     restore_single(model)
     return {
         constant.name.removeprefix(_PREFIX): torch.from_numpy(numpy_helper.to_array(constant).copy())

@@ -17,6 +17,7 @@ from training.exported_weights import take_exported
 from training.networks.blocks import ConvNormRelu
 from training.networks.depth_network import DepthNetwork, DepthOutput, NetworkShape
 from training.trainer import Trainer
+from uavdepth.model.int8_file import SOURCE_METADATA_KEY
 
 
 @pytest.fixture(scope="module")
@@ -104,6 +105,14 @@ def test_an_export_that_lacks_a_layer_is_refused_by_its_name(
     onnx.save(model, str(tmp_path / "lacking.onnx"))
     with pytest.raises(CheckpointError, match=r"lacking\.onnx is not an export of this network.*laterals\.2"):
         take_exported(tmp_path / "lacking.onnx", DepthNetwork(SMALL), batches(pool))
+
+
+def test_an_8_bit_file_is_refused_by_what_it_is(exported: Path, pool: FramePool, tmp_path: Path) -> None:
+    model = onnx.load(str(exported))
+    onnx.helper.set_model_props(model, {SOURCE_METADATA_KEY: "the digest of another file"})
+    onnx.save(model, str(tmp_path / "small.onnx"))
+    with pytest.raises(CheckpointError, match=r"small\.onnx is an 8-bit file: name the network"):
+        take_exported(tmp_path / "small.onnx", DepthNetwork(SMALL), batches(pool))
 
 
 def test_what_is_no_network_is_refused(pool: FramePool, tmp_path: Path) -> None:

@@ -107,9 +107,10 @@ class TestInference:
         depth = DepthModel.load(path, provider="cpu").infer(red(0), camera).depth_m
         assert (depth == 50.0).all()
 
+    @pytest.mark.parametrize("halved", [False, True])
     @pytest.mark.parametrize("gain", [math.nan, math.inf, -math.inf, 1000.0])
-    def test_a_prediction_off_the_scale_is_unknown(self, tmp_path, camera, gain):
-        path = write_red_network(tmp_path / "n.onnx", card_values(), gain=gain)
+    def test_a_prediction_off_the_scale_is_unknown(self, tmp_path, camera, gain, halved):
+        path = write_red_network(tmp_path / "n.onnx", card_values(), gain=gain, halved=halved)
         assert np.isnan(DepthModel.load(path, provider="cpu").infer(red(255), camera).depth_m).all()
 
     @needs_openvino
