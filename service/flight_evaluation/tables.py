@@ -8,6 +8,9 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+_LEAST_COLUMNS = 180
+"""What the tables need."""
+
 
 def render_report(result: dict[str, Any]) -> RenderableType:
     """The tables of `report.report`'s result."""
@@ -25,8 +28,8 @@ def render_report(result: dict[str, Any]) -> RenderableType:
 
 
 def print_report(result: dict[str, Any]) -> None:
-    """Print the tables."""
-    Console().print(render_report(result))
+    """Print the tables; where there is less room in long lines, not in cut numbers."""
+    Console(width=max(_LEAST_COLUMNS, Console().width)).print(render_report(result))
 
 
 def _table(title: str, rows: dict[str, dict[str, Any]]) -> Table:

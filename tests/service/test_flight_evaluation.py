@@ -22,6 +22,7 @@ from service.flight_evaluation.poses import Manoeuvre, hover, random_pose, traje
 from service.flight_evaluation.report import report
 from service.flight_evaluation.sight import DepthKind
 from service.flight_evaluation.survey import Looked
+from service.flight_evaluation.tables import print_report
 from service.flight_evaluation.worlds import DEFAULT_SCENES, Light, WorldSpec, specs_of
 from uavdepth.scenes import SCENE_NAMES
 
@@ -102,6 +103,15 @@ class TestReport:
         wall.looked[:] = [picture(Tally(18, 10, 10, 0, 0, 0, np.empty(0), np.array([np.inf])))]
         text = json.dumps(report(flown, "", "", ""), allow_nan=False)
         assert json.loads(text)["scenes"]["wall"]["nearest_error_median"] is None
+
+    def test_no_number_is_cut_where_there_is_little_room(
+        self, flown: Evaluation, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setenv("COLUMNS", "60")
+        print_report(report(flown, "machine", "date", "model"))
+        told = capsys.readouterr().out
+        assert "corridors passed" in told
+        assert "…" not in told
 
     def test_plots_are_written(self, flown: Evaluation, tmp_path: Path) -> None:
         if not plots_are_possible():
