@@ -19,10 +19,14 @@ from training.checkpoint import Checkpoint
 from training.errors import ExportError
 from training.half_weights import rounded_network, store_in_half
 from training.networks.depth_network import DepthNetwork
+from training.networks.hint_levels import HintLevels
+from training.networks.hint_levels import hint_levels as training_levels
 from training.normalization import FOCAL_REFERENCE_PX, IMAGE_MEAN, IMAGE_STD, MAX_DEPTH_M
 from training.onnx_file import trace, write_checked
 from uavdepth.model.card import ModelCard
 from uavdepth.model.depth_model import DepthModel
+from uavdepth.model.hint_levels import hint_levels, hint_shapes
+from uavdepth.model.point_pixels import PointPixels
 
 LARGEST_DIFFERENCE = 1e-3
 """Of log inverse depth between PyTorch and ONNX Runtime: 0.1 % of depth."""
@@ -50,8 +54,9 @@ _KNOWN_EVERY = 37
 class _TwoOutputs(nn.Module):
     """The network with its outputs as a plain tuple: ONNX knows no dataclasses.
 
-    They stay at half the picture's size; `DepthModel` enlarges them as the network would, in single precision
-    and 0.1 ms, where OpenVINO with AMX took 0.7 ms at 384x192 and 2 ms at 640x320 (23 November 2026).
+    The picture comes with its channels last, as cameras have it and OpenVINO computes with it. The outputs
+    stay at half the picture's size; `DepthModel` enlarges them as the network would, in single precision and
+    0.1 ms, where OpenVINO with AMX took 0.7 ms at 384x192 and 2 ms at 640x320 (23 November 2026).
     """
 
     def __init__(self, network: DepthNetwork, sigma_factor: float = 1.0) -> None:
@@ -59,8 +64,8 @@ class _TwoOutputs(nn.Module):
         self.network = network
         self._log_factor = math.log(sigma_factor)
 
-    def forward(self, image: Tensor, ground: Tensor, points: Tensor) -> tuple[Tensor, Tensor]:
-        output = self.network.at_half_size(image, ground, points)
+    def forward(self, image: Tensor, *hints: Tensor) -> tuple[Tensor, Tensor]:
+        output = self.network.at_half_size(image.permute(0, 3, 1, 2), HintLevels.of_inputs(hints))
         return output.log_inverse_depth, output.log_sigma + self._log_factor
 
 
@@ -123,6 +128,8 @@ def make_card(
         input_width=size[0],
         input_height=size[1],
         hints=("ground", "points"),
+        layout="nhwc",
+        hint_layout="levels",
         mean=IMAGE_MEAN,
         std=IMAGE_STD,
         output="log_inverse_depth",
@@ -148,23 +155,31 @@ def make_card(
 
 
 def _to_onnx(network: _TwoOutputs, card: ModelCard) -> onnx.ModelProto:
-    inputs = tuple(torch.zeros(1, channels, card.input_height, card.input_width) for channels in (3, 1, 2))
-    names = (card.input_name, card.ground_name, card.points_name)
-    return trace(network, inputs, names, (card.output_name, card.uncertainty_name))
+    shapes = {
+        card.input_name: (1, card.input_height, card.input_width, 3),
+        **hint_shapes(card.input_width, card.input_height),
+    }
+    inputs = tuple(torch.zeros(shape) for shape in shapes.values())
+    return trace(network, inputs, tuple(shapes), (card.output_name, card.uncertainty_name))
 
 
 def _check_same_output(network: _TwoOutputs, path: Path) -> None:
-    """Compare ONNX Runtime with PyTorch on a smooth and a noisy picture, with each subset of hints."""
+    """Compare ONNX Runtime with PyTorch on a smooth and a noisy picture, with each subset of hints.
+
+    Each side makes the levels of the hints with its own code.
+    """
     import onnxruntime
 
     card = DepthModel.load(path, provider="cpu").card
     names = [card.output_name, card.uncertainty_name]
     session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
-    inputs = (card.input_name, card.ground_name, card.points_name)
-    for planes in product(_pictures(card), *_hint_maps(card)):
+    for image, ground, points in product(_pictures(card), *_hint_maps(card)):
         with torch.no_grad():
-            wanted = network(*(torch.from_numpy(plane) for plane in planes))
-        outputs = session.run(names, dict(zip(inputs, planes, strict=True)))
+            hints = training_levels(torch.from_numpy(ground), torch.from_numpy(points))
+            wanted = network(torch.from_numpy(image), *hints.inputs)
+        outputs = session.run(
+            names, {card.input_name: image, **hint_levels(ground[0, 0], PointPixels.of_planes(points[0]))}
+        )
         for name, want, output in zip(
             (card.output_name, card.uncertainty_name), wanted, outputs, strict=True
         ):
@@ -177,9 +192,9 @@ def _check_same_output(network: _TwoOutputs, path: Path) -> None:
 
 
 def _pictures(card: ModelCard) -> list[NDArray[np.float32]]:
-    shape = (1, 3, card.input_height, card.input_width)
+    shape = (1, card.input_height, card.input_width, 3)
     noise = np.random.default_rng(0).normal(0.0, 1.0, shape).astype(np.float32)
-    slope = np.linspace(-1.0, 1.0, card.input_height, dtype=np.float32)[None, None, :, None]
+    slope = np.linspace(-1.0, 1.0, card.input_height, dtype=np.float32)[None, :, None, None]
     return [noise, np.ascontiguousarray(np.broadcast_to(slope, shape))]
 
 

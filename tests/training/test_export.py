@@ -20,12 +20,17 @@ from training.data.views import View
 from training.errors import CheckpointError, ExportError
 from training.export import export_checkpoint
 from training.half_weights import SMALLEST_HALVED, rounded_network
+from training.networks.blocks import upsample
+from training.networks.hint_levels import hint_levels
 from training.normalization import MAX_DEPTH_M, depth_from_output
 from uavdepth.attitude import Attitude
 from uavdepth.camera import CameraModel, CameraMount
+from uavdepth.errors import ModelCardError
+from uavdepth.model.card import CARD_METADATA_KEY
 from uavdepth.model.depth_model import DepthModel
 from uavdepth.model.hints import GroundHint, Hints, PointHints
 from uavdepth.model.point_fit import fit_to_points
+from uavdepth.model.point_pixels import PointPixels
 
 SIZE = (128, 64)
 """Another than that of the run: every size comes from one checkpoint."""
@@ -51,12 +56,23 @@ def test_the_card_says_what_the_file_is(checkpoint: Checkpoint, exported: Path) 
     card = DepthModel.load(exported, provider="cpu").card
     assert (card.name, card.input_width, card.input_height) == ("narrow", *SIZE)
     assert (card.card_version, card.hints) == (2, ("ground", "points"))
+    assert (card.layout, card.hint_layout) == ("nhwc", "levels")
     assert (card.output, card.metric, card.uncertainty) == ("log_inverse_depth", True, True)
     assert card.max_depth_m == MAX_DEPTH_M
     assert card.measured == {"median_scaled": {"abs_rel": 0.25}}
     assert f"{checkpoint.images} pictures" in card.effort
     assert f"{checkpoint.frames} rendered frames" in card.training_data
     assert card.training_data.endswith("; two photographs (CC0)")
+
+
+def test_levels_of_another_size_than_the_cards_are_refused(exported: Path, tmp_path: Path) -> None:
+    model = onnx.load(exported)
+    entry = next(entry for entry in model.metadata_props if entry.key == CARD_METADATA_KEY)
+    entry.value = entry.value.replace('"input_width": 128', '"input_width": 160')
+    onnx.save(model, tmp_path / "other.onnx")
+    text = r"'hints_4' is tensor\(float\) \[1, 5, 16, 32\]: float32 \[1, 5, 16, 40\] is needed"
+    with pytest.raises(ModelCardError, match=text):
+        DepthModel.load(tmp_path / "other.onnx", provider="cpu")
 
 
 def some_hints(camera: CameraModel) -> Hints:
@@ -75,11 +91,14 @@ def test_flight_draws_the_depth_that_training_meant_to_the_points_and_scales_sig
     picture = np.random.default_rng(1).integers(0, 256, (SIZE[1], SIZE[0], 3), dtype=np.uint8)
     view = View(camera, CameraMount(), Attitude(0.0, 0.0, 0.0))
     planes = (network_image(picture), *hint_maps(hints, view, *SIZE))
+    image, *maps = (torch.from_numpy(plane)[None] for plane in planes)
     with torch.no_grad():
-        output = checkpoint.averaged_network()(*(torch.from_numpy(plane)[None] for plane in planes))
-    sigma = SIGMA_FACTOR * np.exp(output.log_sigma[0, 0].numpy())
-    drawn = fit_to_points(output.log_inverse_depth[0, 0].numpy(), sigma, planes[2])
-    wanted = depth_from_output(drawn, camera.fx)
+        half = checkpoint.averaged_network().at_half_size(image, hint_levels(*maps))
+    half_sigma = SIGMA_FACTOR * np.exp(half.log_sigma[0, 0].numpy())
+    drawn = half.log_inverse_depth[0, 0].numpy()
+    drawn = fit_to_points(drawn, half_sigma, PointPixels.of_planes(planes[2]))
+    wanted = depth_from_output(upsample(torch.from_numpy(drawn)[None, None])[0, 0].numpy(), camera.fx)
+    sigma = SIGMA_FACTOR * np.exp(upsample(half.log_sigma)[0, 0].numpy())
     answer = DepthModel.load(exported, provider="cpu").infer(picture, camera, hints)
     known = np.isfinite(answer.depth_m) & (wanted < MAX_DEPTH_M)
     assert known.any()

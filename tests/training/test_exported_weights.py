@@ -16,8 +16,11 @@ from training.export import export_checkpoint
 from training.exported_weights import take_exported
 from training.networks.blocks import ConvNormRelu
 from training.networks.depth_network import DepthNetwork, DepthOutput, NetworkShape
+from training.networks.hint_levels import hint_levels as training_levels
 from training.trainer import Trainer
+from uavdepth.model.hint_levels import hint_levels
 from uavdepth.model.int8_file import SOURCE_METADATA_KEY
+from uavdepth.model.point_pixels import PointPixels
 
 
 @pytest.fixture(scope="module")
@@ -50,15 +53,15 @@ def test_it_computes_what_the_file_does(exported: Path, pool: FramePool) -> None
     session = onnxruntime.InferenceSession(str(exported), providers=["CPUExecutionProvider"])
     batch = next(batches(pool, 1))
     with torch.no_grad():
-        output = network.eval().at_half_size(batch.image, batch.ground, batch.points)
+        output = network.eval().at_half_size(batch.image, training_levels(batch.ground, batch.points))
     for index in range(len(batch.image)):
         one = slice(index, index + 1)
+        points = PointPixels.of_planes(batch.points[index].numpy())
         depth, sigma = session.run(
             ["log_inverse_depth", "log_sigma"],
             {
-                "image": batch.image[one].contiguous().numpy(),
-                "ground": batch.ground[one].numpy(),
-                "points": batch.points[one].numpy(),
+                "image": batch.image[one].permute(0, 2, 3, 1).contiguous().numpy(),
+                **hint_levels(batch.ground[index, 0].numpy(), points),
             },
         )
         assert torch.allclose(output.log_inverse_depth[one], torch.from_numpy(depth), atol=1e-4)

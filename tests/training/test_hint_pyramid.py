@@ -10,13 +10,13 @@ from torch import Tensor
 
 from training.networks.hint_correction import point_corrections
 from training.networks.hint_pyramid import (
-    HINT_LEVELS,
     WeightedLevel,
     fill,
     hint_pyramid,
     pooled,
     robust_weights,
 )
+from uavdepth.model.hint_levels import LEVELS
 
 SIZE = (64, 96)
 
@@ -33,6 +33,11 @@ def no_ground() -> Tensor:
     return torch.zeros(1, 1, *SIZE)
 
 
+def corrections(prediction: Tensor, points: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    finest = hint_pyramid(no_ground(), points).points[0]
+    return point_corrections(prediction, finest.mean, finest.weight)
+
+
 def slope() -> Tensor:
     """q that rises tenfold from the top to the bottom, as on ground ahead."""
     return torch.logspace(-2.0, -1.0, SIZE[0])[:, None].expand(SIZE)
@@ -42,7 +47,7 @@ def test_weights_and_values_of_all_points_add_up_at_every_level() -> None:
     points = points_at(slope())
     total = float((points[0, 1] * torch.log(points[0, 0].clamp_min(1e-4))).sum())
     pyramid = hint_pyramid(no_ground(), points)
-    assert len(pyramid.points) == HINT_LEVELS
+    assert len(pyramid.points) == LEVELS
     for level in pyramid.points:
         assert float(level.weight.sum()) == pytest.approx(float(points[0, 1].sum()), rel=1e-5)
         assert float(level.total.sum()) == pytest.approx(total, rel=1e-5)
@@ -104,7 +109,7 @@ def test_one_point_in_ten_wrong_by_two_moves_the_correction_little(factor: float
     rows, columns = torch.nonzero(points[0, 1], as_tuple=True)
     points[0, 0, rows[::10], columns[::10]] *= factor
     prediction = torch.log(truth[::2, ::2])[None, None] - 0.5
-    robust, plain, spread = point_corrections(prediction, hint_pyramid(no_ground(), points))
+    robust, plain, spread = corrections(prediction, points)
     assert float((robust - 0.5).abs().mean()) < 0.08
     assert float((plain - 0.5).abs().mean()) > 1.3 * float((robust - 0.5).abs().mean())
     assert 0.0 < float(spread) < 0.25
@@ -113,7 +118,7 @@ def test_one_point_in_ten_wrong_by_two_moves_the_correction_little(factor: float
 def test_a_prediction_that_the_points_confirm_stays_as_it_is() -> None:
     prediction = torch.log(slope()[::2, ::2] * 1.025)[None, None]
     points = points_at(slope())
-    robust, plain, spread = point_corrections(prediction, hint_pyramid(no_ground(), points))
+    robust, plain, spread = corrections(prediction, points)
     assert float(robust.abs().max()) < 0.1
     assert float(plain.abs().max()) < 0.1
     assert float(spread) < 0.05
@@ -121,7 +126,7 @@ def test_a_prediction_that_the_points_confirm_stays_as_it_is() -> None:
 
 def test_without_points_there_is_no_correction() -> None:
     prediction = torch.zeros(1, 1, SIZE[0] // 2, SIZE[1] // 2)
-    for item in point_corrections(prediction, hint_pyramid(no_ground(), torch.zeros(1, 2, *SIZE))):
+    for item in corrections(prediction, torch.zeros(1, 2, *SIZE)):
         assert float(item.abs().max()) == 0.0
 
 

@@ -77,6 +77,9 @@ def test_a_network_without_hints_is_not_given_any(tmp_path: Path) -> None:
         ({"hints": ["ground", "ground"]}, "'hints' names one twice"),
         ({"hints": ["sun"]}, r"'hints\.0' is 'sun'"),
         ({"card_version": 1}, "'hints' needs card_version = 2"),
+        ({"hint_layout": "levels"}, r"'hint_layout' is 'levels': .* 48x32: multiples of 32 are needed"),
+        ({"hint_layout": "levels", "hints": ["ground"]}, r"needs the hints 'ground' and 'points', not \['gr"),
+        ({"hint_layout": "levels", "input_width": 64}, "hint_layout is 'levels', .* an input 'hints_2', the"),
     ],
 )
 def test_a_card_that_tells_other_hints_than_the_network_takes_is_refused(

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uavdepth import Attitude, CameraModel, CameraMount, GroundHint, HintError, PointHints
-from uavdepth.model.hint_planes import FARTHEST_GROUND_M, MOST_POINTS, ground_plane, point_planes
+from uavdepth.model.hint_planes import FARTHEST_GROUND_M, MOST_POINTS, ground_plane, point_pixels
 
 WIDTH, HEIGHT, FOCAL_PX = 96, 48, 77.0
 LEVEL = Attitude(0.0, 0.0, 0.0)
@@ -94,14 +94,14 @@ class TestGround:
         with pytest.raises(HintError):
             ground_plane(GroundHint(STRAIGHT, LEVEL, 2.0), camera, *arguments)
         with pytest.raises(HintError):
-            point_planes(points([(1, 1)], [1], [0]), camera, *arguments)
+            point_pixels(points([(1, 1)], [1], [0]), camera, *arguments)
 
 
 class TestPoints:
     camera = CameraModel(2 * WIDTH, 3 * HEIGHT, 100.0, 110.0, 90.0, 70.0)
 
     def planes(self, hints: PointHints) -> np.ndarray:
-        return point_planes(hints, self.camera, WIDTH, HEIGHT, FOCAL_PX)
+        return point_pixels(hints, self.camera, WIDTH, HEIGHT, FOCAL_PX).planes
 
     def test_a_point_lands_in_the_pixel_that_covers_it_with_its_depth_and_confidence(self):
         planes = self.planes(points([(21.4, 31.6)], [8.0], [0.1]))

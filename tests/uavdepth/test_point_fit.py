@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from uavdepth.model.hint_planes import HALF_CONFIDENCE_SIGMA
 from uavdepth.model.point_fit import fit_to_points
+from uavdepth.model.point_pixels import PointPixels
 
 HEIGHT, WIDTH = 96, 192
 TRUE_LOG_Q = np.broadcast_to(np.linspace(-3.5, -1.0, HEIGHT, dtype=np.float32)[:, None], (HEIGHT, WIDTH))
@@ -27,7 +28,9 @@ def fit(
     predicted: NDArray[np.float32], planes: NDArray[np.float32], sigma: float = 0.5
 ) -> NDArray[np.float32]:
     """The fit of a network that is that sure of itself everywhere."""
-    return fit_to_points(predicted, np.full(predicted.shape, sigma, np.float32), planes)
+    return fit_to_points(
+        predicted, np.full(predicted.shape, sigma, np.float32), PointPixels.of_planes(planes)
+    )
 
 
 def scattered(count: int, seed: int = 0) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

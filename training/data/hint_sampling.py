@@ -13,7 +13,7 @@ from training.data.views import View
 from training.errors import TrainingSettingsError
 from training.normalization import FOCAL_REFERENCE_PX
 from uavdepth.attitude import Attitude
-from uavdepth.model.hint_planes import ground_plane, point_planes
+from uavdepth.model.hint_planes import ground_plane, point_pixels
 from uavdepth.model.hints import GroundHint, Hints
 
 POINT_COUNTS = (5, 300)
@@ -97,4 +97,4 @@ def hint_maps(
         ground[0] = ground_plane(hints.ground, view.camera, width, height, FOCAL_REFERENCE_PX)
     if hints.points is None:
         return ground, np.zeros((2, height, width), np.float32)
-    return ground, point_planes(hints.points, view.camera, width, height, FOCAL_REFERENCE_PX)
+    return ground, point_pixels(hints.points, view.camera, width, height, FOCAL_REFERENCE_PX).planes

@@ -21,7 +21,7 @@ from training.networks.decoder import Decoder, Head
 from training.networks.encoder import ENCODER_CHANNELS, EfficientNetLite0
 from training.networks.hint_correction import HintCorrection
 from training.networks.hint_encoder import HintEncoder
-from training.networks.hint_pyramid import hint_pyramid
+from training.networks.hint_levels import HintLevels, hint_levels
 
 INITIAL_DEPTH_M = 8.0
 """Depth that an untrained head gives: about the median of the training frames."""
@@ -95,19 +95,16 @@ class DepthNetwork(nn.Module):
             ground: (N, 1, H, W) q of the flat ground (`uavdepth.model.hint_planes`), 0 where there is none.
             points: (N, 2, H, W) q of measured points and the confidence in them, 0 where there is none.
         """
-        half = self.at_half_size(image, ground, points)
+        size = (image.shape[0], 1, *image.shape[2:])
+        ground = image.new_zeros(size) if ground is None else ground
+        points = image.new_zeros((size[0], 2, *size[2:])) if points is None else points
+        half = self.at_half_size(image, hint_levels(ground, points))
         return DepthOutput(
             upsample(half.log_inverse_depth), upsample(half.log_sigma), upsample(half.uncorrected)
         )
 
-    def at_half_size(
-        self, image: Tensor, ground: Tensor | None = None, points: Tensor | None = None
-    ) -> DepthOutput:
+    def at_half_size(self, image: Tensor, hints: HintLevels) -> DepthOutput:
         """The same before it is brought to the picture's size, (N, 1, H/2, W/2) each: what is exported."""
-        size = (image.shape[0], 1, *image.shape[2:])
-        ground = image.new_zeros(size) if ground is None else ground
-        points = image.new_zeros((size[0], 2, *size[2:])) if points is None else points
-        hints = hint_pyramid(ground, points)
         additions, hinted_context = self.hints(hints)
         pyramid = [
             lateral(level) + addition

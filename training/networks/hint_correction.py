@@ -8,17 +8,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from training.networks.blocks import replicate_border, upsample
-from training.networks.hint_encoder import normalised
-from training.networks.hint_pyramid import (
-    HINT_LEVELS,
-    HintPyramid,
-    WeightedLevel,
-    fill,
-    picture_mean,
-    pooled,
-    robust_weights,
-)
+from training.networks.blocks import replicate_border
+from training.networks.hint_levels import HintLevels, normalised
+from training.networks.hint_pyramid import WeightedLevel, fill, picture_mean, pooled, robust_weights
+from uavdepth.model.hint_levels import LEVELS, NEARNESS_CHANNELS
 
 OUTLIER_SCALE = 0.3
 """Distance (of log depth) from the picture's mean correction at which a point counts half."""
@@ -29,10 +22,7 @@ LARGEST_CORRECTION = 3.0
 FEW_POINTS = 0.1
 """Weight of "no correction" against the points of a picture: a tenth of one sure point."""
 
-_WEIGHT_LEVELS = (0, 2, 4)
-"""Levels whose weights of points tell how far the next one is."""
-
-_EXTRA_INPUTS = 6 + len(_WEIGHT_LEVELS)
+_EXTRA_INPUTS = 5 + NEARNESS_CHANNELS
 
 
 class HintCorrection(nn.Module):
@@ -58,11 +48,11 @@ class HintCorrection(nn.Module):
         with torch.no_grad():
             self.output.bias.copy_(torch.tensor([0.0, math.log(relative_sigma)]))  # type: ignore[union-attr]
 
-    def forward(self, features: Tensor, prediction: Tensor, hints: HintPyramid) -> tuple[Tensor, Tensor]:
+    def forward(self, features: Tensor, prediction: Tensor, hints: HintLevels) -> tuple[Tensor, Tensor]:
         """Corrected log inverse depth and log sigma, (N, 1, h, w) each, at the features' resolution."""
-        robust, plain, spread = point_corrections(prediction, hints)
-        ground = hints.ground[0]
-        difference = (ground.mean - prediction).clamp(-LARGEST_CORRECTION, LARGEST_CORRECTION)
+        mean, weight, ground = (hints.measured[:, channel : channel + 1] for channel in range(3))
+        robust, plain, spread = point_corrections(prediction, mean, weight)
+        difference = (ground - prediction).clamp(-LARGEST_CORRECTION, LARGEST_CORRECTION)
         stacked = torch.cat(
             [
                 features,
@@ -70,9 +60,8 @@ class HintCorrection(nn.Module):
                 robust,
                 plain - robust,
                 spread.expand_as(robust),
-                difference * ground.weight,
-                ground.weight,
-                *_nearness(hints),
+                difference * hints.nearness[:, :1],
+                hints.nearness,
             ],
             dim=1,
         )
@@ -82,36 +71,24 @@ class HintCorrection(nn.Module):
         return prediction + robust + learnt, log_sigma
 
 
-def point_corrections(prediction: Tensor, hints: HintPyramid) -> tuple[Tensor, Tensor, Tensor]:
+def point_corrections(prediction: Tensor, mean: Tensor, weight: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     """Dense corrections of log inverse depth that the points ask for.
 
     Args:
-        prediction: (N, 1, h, w) at the pyramid's finest level.
-        hints: with the points.
+        prediction: (N, 1, h, w) at half the picture's size.
+        mean, weight: (N, 1, h, w) log q of the points in each cell, and their weight.
 
     Returns:
         (N, 1, h, w) with robust weights, (N, 1, h, w) with the plain ones, and (N, 1, 1, 1) the spread of
         the points' residuals; all 0 without points.
     """
-    finest = hints.points[0]
-    residual = (finest.mean - prediction).clamp(-LARGEST_CORRECTION, LARGEST_CORRECTION)
+    residual = (mean - prediction).clamp(-LARGEST_CORRECTION, LARGEST_CORRECTION)
     # Weights that follow the prediction would reward predictions that make outliers of inconvenient points.
-    robust = robust_weights(residual.detach(), finest.weight, OUTLIER_SCALE)
+    robust = robust_weights(residual.detach(), weight, OUTLIER_SCALE)
     # Stacked as pictures, not as channels: maps of one channel are pooled in half the time.
-    weights = torch.cat([robust, finest.weight])
+    weights = torch.cat([robust, weight])
     weighted = WeightedLevel(weights * torch.cat([residual, residual]), weights)
-    filled = fill([weighted, *pooled(weighted, HINT_LEVELS - 1, share=False)], FEW_POINTS)[0]
+    filled = fill([weighted, *pooled(weighted, LEVELS - 1, share=False)], FEW_POINTS)[0]
     deviation = (residual - picture_mean(residual, robust)).abs()
     with_robust, with_plain = filled.chunk(2)
     return with_robust, with_plain, picture_mean(deviation, robust)
-
-
-def _nearness(hints: HintPyramid) -> list[Tensor]:
-    """(N, 1, h, w) each: weight of points in the cells around each pixel, at some levels."""
-    maps = []
-    for level in _WEIGHT_LEVELS:
-        weight = torch.log1p(hints.points[level].weight)
-        for _ in range(level):
-            weight = upsample(weight)
-        maps.append(weight)
-    return maps

@@ -15,20 +15,16 @@ from torch import Tensor
 from torch.nn import functional
 
 from training.networks.blocks import upsample
-
-HINT_LEVELS = 5
-"""1/2, 1/4, 1/8, 1/16 and 1/32 of the picture, as the encoder's maps."""
-
-_SMALLEST_Q = 1e-4
-"""Smaller q, 10 km away, is no hint that anybody gives; it keeps the logarithm of "no hint" finite."""
-
-_PRIOR_WEIGHT = 0.25
-"""Weight of the coarser level in a cell: a quarter of a sure point's, so that one point rules its cell."""
+from uavdepth.model.hint_levels import (
+    LEAST_WEIGHT,
+    LEVELS,
+    NEIGHBOURHOODS,
+    PRIOR_WEIGHT,
+    SMALLEST_Q,
+    WHOLE_PRIOR,
+)
 
 _REWEIGHTINGS = 2
-
-_NEIGHBOURHOODS = (3, 7)
-"""Cells of the coarsest level that stand for each other before the whole picture does."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +42,7 @@ class WeightedLevel:
     @property
     def mean(self) -> Tensor:
         """(N, C, h, w) mean value in each cell, 0 where there is no point."""
-        return self.total / self.weight.clamp_min(1e-6)
+        return self.total / self.weight.clamp_min(LEAST_WEIGHT)
 
 
 @dataclass(frozen=True)
@@ -72,8 +68,8 @@ def hint_pyramid(ground: Tensor, points: Tensor) -> HintPyramid:
     confidence = points[:, 1:]
     known = (ground > 0).to(ground.dtype)
     return HintPyramid(
-        pooled(WeightedLevel(confidence * _log(points[:, :1]), confidence), HINT_LEVELS, share=False),
-        pooled(WeightedLevel(known * _log(ground), known), HINT_LEVELS, share=True),
+        pooled(WeightedLevel(confidence * _log(points[:, :1]), confidence), LEVELS, share=False),
+        pooled(WeightedLevel(known * _log(ground), known), LEVELS, share=True),
     )
 
 
@@ -89,7 +85,7 @@ def pooled(level: WeightedLevel, count: int, share: bool) -> list[WeightedLevel]
     return levels
 
 
-def fill(levels: Sequence[WeightedLevel], whole_prior: float = 1e-3) -> list[Tensor]:
+def fill(levels: Sequence[WeightedLevel], whole_prior: float = WHOLE_PRIOR) -> list[Tensor]:
     """Dense values of every level, finest first; 0 everywhere if there is no point at all.
 
     Args:
@@ -101,7 +97,7 @@ def fill(levels: Sequence[WeightedLevel], whole_prior: float = 1e-3) -> list[Ten
         coarsest.total.sum(dim=(2, 3), keepdim=True), coarsest.weight.sum(dim=(2, 3), keepdim=True)
     )
     value = whole.total / (whole.weight + whole_prior)
-    for size in reversed(_NEIGHBOURHOODS):
+    for size in reversed(NEIGHBOURHOODS):
         value = _blended(WeightedLevel(_around(coarsest.total, size), _around(coarsest.weight, size)), value)
     filled = [_blended(coarsest, value)]
     for level in reversed(levels[:-1]):
@@ -132,11 +128,11 @@ def picture_mean(values: Tensor, weights: Tensor) -> Tensor:
 
 
 def _log(q: Tensor) -> Tensor:
-    return torch.log(q.clamp_min(_SMALLEST_Q))
+    return torch.log(q.clamp_min(SMALLEST_Q))
 
 
 def _blended(level: WeightedLevel, coarser: Tensor) -> Tensor:
-    return (level.total + _PRIOR_WEIGHT * coarser) / (level.weight + _PRIOR_WEIGHT)
+    return (level.total + PRIOR_WEIGHT * coarser) / (level.weight + PRIOR_WEIGHT)
 
 
 def _around(sums: Tensor, size: int) -> Tensor:

@@ -18,7 +18,8 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from uavdepth.camera import CameraModel
-from uavdepth.errors import ModelCardError
+from uavdepth.errors import HintError, ModelCardError
+from uavdepth.model.hint_levels import hint_shapes
 
 CARD_METADATA_KEY = "uavdepth.card"
 """Key of the ONNX metadata_props entry that holds the card as JSON."""
@@ -59,6 +60,7 @@ _SECOND_VERSION_KEYS = (
     "hints",
     "ground_name",
     "points_name",
+    "hint_layout",
 )
 """Keys that version 1 did not have."""
 
@@ -94,6 +96,9 @@ class ModelCard(BaseModel):
 
         ground:  (1, 1, H, W)  inverse depth of level ground
         points:  (1, 2, H, W)  inverse depth of measured points, and the confidence in it
+
+    Where `hint_layout` is "levels" they are instead what `uavdepth.model.hint_levels` makes of these planes,
+    with the names that it gives.
 
     Version 1 has fixed sizes, no hints, and output kinds of a focal length only.
     """
@@ -136,6 +141,9 @@ class ModelCard(BaseModel):
     channel_order: Literal["rgb", "bgr"] = Field(default="rgb", description="Order of the input's channels.")
     layout: Literal["nchw", "nhwc"] = Field(default="nchw", description="Order of the input's axes.")
     hints: tuple[HintName, ...] = Field(default=(), description="Hints that the network takes.")
+    hint_layout: Literal["planes", "levels"] = Field(
+        default="planes", description="Hints are planes of the picture's size, or their levels."
+    )
     input_name: Text = Field(default="image", description="Name of the network's input.")
     ground_name: Text = Field(default="ground", description="Name of the ground hint's input.")
     points_name: Text = Field(default="points", description="Name of the point hints' input.")
@@ -187,9 +195,9 @@ class ModelCard(BaseModel):
         return complaints
 
     def _complaints_of_hints(self) -> list[str]:
+        complaints = self._complaints_of_levels() if self.hint_layout == "levels" else []
         if not self.hints:
-            return []
-        complaints = []
+            return complaints
         if len(set(self.hints)) != len(self.hints):
             complaints.append(f"the model card's key 'hints' names one twice: {list(self.hints)}")
         # Planes are in the unit of the output, and only who knows metres can tell them from the planes.
@@ -201,6 +209,17 @@ class ModelCard(BaseModel):
         ]
         if self.multiple_of is not None:
             complaints.append("the model card's key 'multiple_of': a network with hints has a fixed size")
+        return complaints
+
+    def _complaints_of_levels(self) -> list[str]:
+        key = "the model card's key 'hint_layout' is 'levels'"
+        complaints = []
+        if set(self.hints) != {"ground", "points"}:
+            complaints.append(f"{key}: it needs the hints 'ground' and 'points', not {list(self.hints)}")
+        try:
+            hint_shapes(self.input_width, self.input_height)
+        except HintError as error:
+            complaints.append(f"{key}: {error}")
         return complaints
 
     @property

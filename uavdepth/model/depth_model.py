@@ -13,11 +13,13 @@ from uavdepth.camera import CameraModel
 from uavdepth.depth.depth_map import DepthMap
 from uavdepth.errors import ImageSizeError, ModelCardError, ModelFileError
 from uavdepth.model.card import ModelCard
-from uavdepth.model.hint_planes import ground_plane, point_planes
+from uavdepth.model.hint_levels import hint_levels
+from uavdepth.model.hint_planes import ground_plane, point_pixels
 from uavdepth.model.hints import Hints
 from uavdepth.model.inference import InferenceSession, open_session
 from uavdepth.model.network_file import WEIGHTS_FOLDER, find_network, network_problems, read_card
 from uavdepth.model.point_fit import fit_to_points
+from uavdepth.model.point_pixels import PointPixels
 
 __all__ = ["WEIGHTS_FOLDER", "DepthModel"]
 
@@ -36,10 +38,12 @@ class DepthModel:
     def __init__(self, inference: InferenceSession, card: ModelCard, source: str) -> None:
         self._session: Any = inference.session
         self._output_names = [card.output_name] + ([card.uncertainty_name] if card.uncertainty else [])
-        # Channel numbers are those of the BGR picture, in the order that the network wants them.
-        self._channels = (2, 1, 0) if card.channel_order == "rgb" else (0, 1, 2)
-        self._gain = [np.float32(1.0 / (255.0 * card.std[2 - channel])) for channel in self._channels]
-        self._offset = [np.float32(-card.mean[2 - c] / card.std[2 - c]) for c in self._channels]
+        # What each of a pixel's 256 values becomes, for the channels in the network's order.
+        levels = np.arange(256, dtype=np.float32)[:, None] / np.float32(255.0)
+        normalised = (levels - np.array(card.mean, np.float32)) / np.array(card.std, np.float32)
+        ordered = normalised if card.channel_order == "rgb" else normalised[:, ::-1]
+        self._pixel_table = np.asarray(ordered[None].copy(), np.float32)
+        self._channel_tables = np.asarray(ordered.T.copy(), np.float32)
         self._is_half = any(
             item.name == card.input_name and item.type == "tensor(float16)"
             for item in inference.session.get_inputs()
@@ -112,22 +116,21 @@ class DepthModel:
         _check_picture(image_bgr, camera)
         width, height = self.card.input_size(camera)
         inputs: dict[str, NDArray[Any]] = {self.card.input_name: self._prepare(image_bgr, width, height)}
-        if self.card.hints:
-            inputs.update(self._planes(hints or Hints(), camera))
+        ground, points = self._at_its_pixels(hints or Hints(), camera)
+        inputs.update(self._hint_inputs(ground, points))
         outputs = self._session.run(self._output_names, inputs)
 
-        enlarged_to = (width, height) if self.card.output == "log_inverse_depth" else (0, 0)
-        values = _enlarged(self._rows_and_columns(outputs[0]), enlarged_to)
+        values = self._rows_and_columns(outputs[0])
         if self.card.output == "affine_inverse_depth":
             values = np.where(np.isfinite(values), values, np.float32(np.nan))
             return DepthMap.from_affine(_to_pixels_of(camera, values))
-        sigma = None
-        if self.card.uncertainty:
-            with np.errstate(over="ignore"):
-                logs = _enlarged(self._rows_and_columns(outputs[1]), enlarged_to)
-                sigma = np.exp(logs, dtype=np.float32)
-        if sigma is not None and self.card.output == "log_inverse_depth" and "points" in self.card.hints:
-            values = fit_to_points(values, sigma, inputs[self.card.points_name][0])
+        logs = self._rows_and_columns(outputs[1]) if self.card.uncertainty else None
+        if self.card.output == "log_inverse_depth":
+            if logs is not None and len(points):
+                values = fit_to_points(values, _exponential(logs), points)
+            values = _enlarged(values, (width, height))
+            logs = None if logs is None else _enlarged(logs, (width, height))
+        sigma = None if logs is None else _exponential(logs)
         depth = _to_pixels_of(camera, self._depth(values, camera.fx * width / camera.width))
         if sigma is not None:
             sigma = _to_pixels_of(camera, sigma)
@@ -139,30 +142,40 @@ class DepthModel:
         if image_bgr.shape[:2] != (height, width):
             # Area averaging: the only resize that does not alias fine texture when shrinking.
             image_bgr = np.asarray(cv2.resize(image_bgr, (width, height), interpolation=cv2.INTER_AREA))
-        is_last = self.card.layout == "nhwc"
-        picture = np.empty((height, width, 3) if is_last else (3, height, width), dtype=np.float32)
-        for number, channel in enumerate(self._channels):
-            plane = picture[..., number] if is_last else picture[number]
-            np.multiply(image_bgr[:, :, channel], self._gain[number], out=plane)
-            plane += self._offset[number]
+        if self.card.channel_order == "rgb":
+            image_bgr = np.asarray(cv2.cvtColor(image_bgr, cv2.COLOR_BGR2RGB))
+        if self.card.layout == "nhwc":
+            picture = np.asarray(cv2.LUT(image_bgr, self._pixel_table), np.float32)
+        else:
+            picture = np.empty((3, height, width), dtype=np.float32)
+            for number, channel in enumerate(cv2.split(image_bgr)):
+                cv2.LUT(channel, self._channel_tables[number], dst=picture[number])
         return picture[None].astype(np.float16) if self._is_half else picture[None]
 
-    def _planes(self, hints: Hints, camera: CameraModel) -> dict[str, NDArray[np.float32]]:
-        """The hints' inputs, 0 everywhere for those that are not given."""
+    def _at_its_pixels(self, hints: Hints, camera: CameraModel) -> tuple[NDArray[np.float32], PointPixels]:
+        """(h, w) q of the ground, and the points; what is not given or not taken is known nowhere."""
         card = self.card
         width, height, focal_px = card.input_width, card.input_height, card.focal_px or 1.0
-        planes = {}
+        ground, points = np.zeros((height, width), np.float32), PointPixels.none(width, height)
+        if "ground" in card.hints and hints.ground is not None:
+            ground = ground_plane(hints.ground, camera, width, height, focal_px)
+        if "points" in card.hints and hints.points is not None:
+            points = point_pixels(hints.points, camera, width, height, focal_px)
+        return ground, points
+
+    def _hint_inputs(
+        self, ground: NDArray[np.float32], points: PointPixels
+    ) -> dict[str, NDArray[np.float32]]:
+        """The network's inputs for hints."""
+        card = self.card
+        if card.hint_layout == "levels":
+            return hint_levels(ground, points)
+        inputs = {}
         if "ground" in card.hints:
-            ground = np.zeros((1, height, width), dtype=np.float32)
-            if hints.ground is not None:
-                ground[0] = ground_plane(hints.ground, camera, width, height, focal_px)
-            planes[card.ground_name] = ground[None]
+            inputs[card.ground_name] = ground[None, None]
         if "points" in card.hints:
-            points = np.zeros((2, height, width), dtype=np.float32)
-            if hints.points is not None:
-                points = point_planes(hints.points, camera, width, height, focal_px)
-            planes[card.points_name] = points[None]
-        return planes
+            inputs[card.points_name] = points.planes[None]
+        return inputs
 
     def _rows_and_columns(self, output: NDArray[Any]) -> NDArray[np.float32]:
         """(h, w) float32 of an output, whatever axes of length 1 it has."""
@@ -210,6 +223,11 @@ def _check_picture(image_bgr: NDArray[np.uint8], camera: CameraModel) -> None:
         raise ImageSizeError(
             f"the picture is {shape[1]}x{shape[0]} pixels, the camera is {camera.width}x{camera.height}"
         )
+
+
+def _exponential(logs: NDArray[np.float32]) -> NDArray[np.float32]:
+    with np.errstate(over="ignore"):
+        return np.exp(logs, dtype=np.float32)
 
 
 def _enlarged(logs: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from uavdepth.camera import CameraModel
 from uavdepth.errors import HintError
 from uavdepth.model.hints import GroundHint, PointHints
+from uavdepth.model.point_pixels import PointPixels
 
 FARTHEST_GROUND_M = 200.0
 """From 3.5 m up, ground so far away lies 1 degree below the horizon: as much as an attitude is wrong."""
@@ -60,10 +61,10 @@ def ground_plane(
     return q
 
 
-def point_planes(
+def point_pixels(
     points: PointHints, camera: CameraModel, width: int, height: int, focal_px: float
-) -> NDArray[np.float32]:
-    """(2, height, width) float32: q at the points' pixels, and the confidence in it; 0 elsewhere.
+) -> PointPixels:
+    """The points at the network's pixels, with the confidence in them.
 
     Confidence is 1 / (1 + (relative_sigma / 0.1)^2), from 1 for an exact point towards 0. Points outside
     the picture are left out; of more than `MOST_POINTS` the surest stay, of several in one pixel the
@@ -77,7 +78,6 @@ def point_planes(
         HintError: a size or focal length that is not above 0.
     """
     _check_unit(width, height, focal_px)
-    planes = np.zeros((2, height, width), dtype=np.float32)
     # Pixel i covers i - 0.5 to i + 0.5, so the camera's picture begins at -0.5, as the network's does.
     scale = np.array([width / camera.width, height / camera.height])
     cell = np.floor((points.pixels.astype(np.float64) + 0.5) * scale)
@@ -85,11 +85,12 @@ def point_planes(
     column, row = cell[inside].astype(np.intp).T
     depth_m = np.maximum(points.depth_m[inside].astype(np.float64), NEAREST_POINT_M)
     sigma = points.relative_sigma[inside].astype(np.float64)
-    # Written in this order, the surest comes last and stays.
-    order = np.lexsort((depth_m, sigma))[:MOST_POINTS][::-1]
-    planes[0, row[order], column[order]] = _focal(camera, width) / (focal_px * depth_m[order])
-    planes[1, row[order], column[order]] = 1.0 / (1.0 + (sigma[order] / HALF_CONFIDENCE_SIGMA) ** 2)
-    return planes
+    surest = np.lexsort((depth_m, sigma))[:MOST_POINTS]
+    _, first = np.unique(row[surest] * width + column[surest], return_index=True)
+    chosen = surest[first]
+    q = (_focal(camera, width) / (focal_px * depth_m[chosen])).astype(np.float32)
+    confidence = (1.0 / (1.0 + (sigma[chosen] / HALF_CONFIDENCE_SIGMA) ** 2)).astype(np.float32)
+    return PointPixels(width, height, row[chosen], column[chosen], q, confidence)
 
 
 def _focal(camera: CameraModel, width: int) -> float:

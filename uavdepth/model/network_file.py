@@ -9,6 +9,7 @@ from typing import Any
 
 from uavdepth.errors import ModelCardError, ModelFileError
 from uavdepth.model.card import CARD_FILE_SUFFIX, CARD_METADATA_KEY, ModelCard
+from uavdepth.model.hint_levels import hint_shapes
 from uavdepth.model.int8_file import INT8_SUFFIX
 
 WEIGHTS_FOLDER = Path(__file__).parent.parent / "weights"
@@ -105,14 +106,17 @@ def network_problems(session: Any, card: ModelCard) -> list[Problem]:
 
 
 def _names_that_are_missing(card: ModelCard, inputs: list[str], outputs: list[str]) -> Iterator[Problem]:
-    wanted = {"input_name": card.input_name, **{f"{hint}_name": _input_of(card, hint) for hint in card.hints}}
-    for key, name in wanted.items():
-        if name not in inputs:
-            yield Problem(
-                f"the card's {key} is '{name}', the network's inputs are {inputs}",
-                f"set {key} to the name of the input" + (", or take it from hints" if card.hints else ""),
-            )
-    unknown = [name for name in inputs if name not in wanted.values()]
+    wanted = {card.input_name: "input_name", **_hint_inputs(card)}
+    for name, key in wanted.items():
+        if name in inputs:
+            continue
+        if key == "hint_layout":
+            text, fix = "'levels', which needs an input " + repr(name), "set it to 'planes', or export anew"
+        else:
+            text = repr(name)
+            fix = f"set {key} to the name of the input" + (", or take it from hints" if card.hints else "")
+        yield Problem(f"the card's {key} is {text}, the network's inputs are {inputs}", fix)
+    unknown = [name for name in inputs if name not in wanted]
     if unknown and len(inputs) > len(wanted):
         yield Problem(
             f"the network has inputs that the card does not explain: {unknown}",
@@ -131,7 +135,10 @@ def _names_that_are_missing(card: ModelCard, inputs: list[str], outputs: list[st
 
 def _inputs_that_do_not_fit(card: ModelCard, inputs: dict[str, Any]) -> Iterator[Problem]:
     channels = {card.input_name: 3}
-    channels.update({_input_of(card, hint): {"ground": 1, "points": 2}[hint] for hint in card.hints})
+    if card.hint_layout == "levels":
+        yield from _levels_that_do_not_fit(card, inputs)
+    else:
+        channels.update({_input_of(card, hint): {"ground": 1, "points": 2}[hint] for hint in card.hints})
     for name, count in channels.items():
         if name not in inputs:
             continue
@@ -171,6 +178,16 @@ def _inputs_that_do_not_fit(card: ModelCard, inputs: dict[str, Any]) -> Iterator
                 )
 
 
+def _levels_that_do_not_fit(card: ModelCard, inputs: dict[str, Any]) -> Iterator[Problem]:
+    for name, wanted in hint_shapes(card.input_width, card.input_height).items():
+        if name in inputs and (tuple(inputs[name].shape), inputs[name].type) != (wanted, _INPUT_TYPES[0]):
+            yield Problem(
+                f"the network's input '{name}' is {inputs[name].type} {list(inputs[name].shape)}: "
+                f"float32 {list(wanted)} is needed",
+                "export it anew with this version",
+            )
+
+
 def _outputs_that_do_not_fit(card: ModelCard, outputs: dict[str, Any]) -> Iterator[Problem]:
     for name in (card.output_name, card.uncertainty_name) if card.uncertainty else (card.output_name,):
         if name not in outputs:
@@ -186,6 +203,13 @@ def _outputs_that_do_not_fit(card: ModelCard, outputs: dict[str, Any]) -> Iterat
                 f"the network's output '{name}' is {outputs[name].type}: float32 is needed",
                 "export it with a float32 output",
             )
+
+
+def _hint_inputs(card: ModelCard) -> dict[str, str]:
+    """Names of the inputs for hints, with the card's keys that ask for them."""
+    if card.hint_layout == "levels":
+        return dict.fromkeys(hint_shapes(card.input_width, card.input_height), "hint_layout")
+    return {_input_of(card, hint): f"{hint}_name" for hint in card.hints}
 
 
 def _input_of(card: ModelCard, hint: str) -> str:

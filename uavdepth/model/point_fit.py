@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uavdepth.model.hint_planes import HALF_CONFIDENCE_SIGMA
+from uavdepth.model.point_pixels import PointPixels
 
 _COLUMNS = 32
 """Cells of the corrections' grid across the picture: corrections are equal inside a cell."""
@@ -74,28 +75,30 @@ _STEP = 0.2
 
 
 def fit_to_points(
-    log_q: NDArray[np.float32], sigma: NDArray[np.float32], planes: NDArray[np.float32]
+    log_q: NDArray[np.float32], sigma: NDArray[np.float32], measured: PointPixels
 ) -> NDArray[np.float32]:
     """The prediction, corrected by what the points say.
 
     Args:
         log_q: (h, w) float32 predicted log inverse depth, in any unit; what is not finite stays as it is.
         sigma: (h, w) float32 its standard deviation; what is not finite is as unsure as can be.
-        planes: (2, h, w) float32 measured q at the points' pixels, in the unit of the prediction, and the
-            confidence in it, 0 elsewhere; as `uavdepth.model.hint_planes.point_planes` makes them.
+        measured: the points, in the unit of the prediction. Their picture may be larger: what is predicted at
+            them lies between pixels of the prediction then.
 
     Returns:
         (h, w) float32; the prediction itself without points.
     """
-    row, column = _pixels_of_points(log_q, planes)
-    if len(row) == 0:
+    row, column = measured.cells(log_q.shape[1], log_q.shape[0])
+    here = measured.sampled(log_q)
+    usable = np.isfinite(here)
+    if not usable.any():
         return log_q
-    here = log_q[row, column]
+    row, column, here = row[usable], column[usable], here[usable]
     # Written so that NaN is the most, too.
     sigma = np.where(
         sigma < _MOST_SIGMA, np.maximum(sigma, np.float32(_LEAST_SIGMA)), np.float32(_MOST_SIGMA)
     )
-    variance = HALF_CONFIDENCE_SIGMA**2 * (1.0 / planes[1, row, column] - 1.0)
+    variance = HALF_CONFIDENCE_SIGMA**2 * (1.0 / measured.confidence[usable] - 1.0)
     points = _Points(
         row,
         column,
@@ -103,7 +106,7 @@ def fit_to_points(
         np.asarray(1.0 / (variance + _POINT_SIGMA**2), np.float32),
         np.maximum(_OUTLIER_SIGMAS * np.sqrt(np.square(sigma[row, column]) + variance), _LEAST_OUTLIER),
     )
-    residual = np.log(planes[0, row, column]) - here
+    residual = np.log(measured.q[usable]) - here
     shared = np.float32(_SHARED_SIGMA**2) + np.median(variance)
     grid = _Grid.around(here, log_q.shape)
     regional = grid.of_cells(np.square(_REGIONAL_SHARE * sigma))
@@ -205,15 +208,6 @@ class _Grid:
         total = sums[:, :columns].reshape(self.shape)
         mean = sums[:, columns:].reshape(self.shape) / np.maximum(total, np.float32(1e-12))
         return mean, total
-
-
-def _pixels_of_points(
-    log_q: NDArray[np.float32], planes: NDArray[np.float32]
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Row and column of the points that lie on a prediction."""
-    row, column = np.nonzero(planes[1] > 0)
-    usable = (planes[0, row, column] > 0) & np.isfinite(log_q[row, column])
-    return row[usable], column[usable]
 
 
 def _centres(cells: int, pixels: int) -> NDArray[np.float64]:
