@@ -43,13 +43,13 @@ class ScanSettings(Section):
         description="Obstacles count up to so far above the vehicle's flight level.",
     )
     sigma_factor: float = Field(
-        default=0.5,
+        default=0.25,
         ge=0.0,
         le=5.0,
         title="Caution about distances, standard deviations",
         description="Distances are told as d * (1 - sigma_factor * sigma), sigma being the network's own "
         "relative uncertainty, a quarter nearer at most, and a direction is clear only if it would be at "
-        "d * (1 - 3 * sigma_factor * sigma) too. 0 shortens nothing.",
+        "d * (1 - 4 * sigma_factor * sigma) too. 0 shortens nothing.",
     )
     max_ground_slope_deg: float = Field(
         default=15.0,

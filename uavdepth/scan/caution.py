@@ -9,15 +9,13 @@ from uavdepth.errors import ScanError
 
 LARGEST_SHORTENING = 0.25
 """However doubtful a distance, at most so much of it is taken off: an obstacle at no distance at all would
-stop the vehicle for good."""
+stop the vehicle for good. What may so begin within maximum distance is told; what only may by more doubt
+than this is unknown."""
 
-FREEING_FACTOR = 3.0
+FREEING_FACTOR = 4.0
 """A way is freed by so many times the standard deviations that distances are shortened by: what is nearest in
 an element has erred towards the vehicle already, what is taken for free has not (docs/flight-evaluation.md).
 """
-
-_FARTHEST_REACH = 0.4
-"""A surface beyond maximum distance is told where at most so much of its distance is doubtful."""
 
 
 class ScanCaution:
@@ -41,11 +39,10 @@ class ScanCaution:
         self._max_sigma = np.float32(max_relative_sigma)
         self._freeing = np.float32(FREEING_FACTOR * sigma_factor)
         self._largest = np.float32(LARGEST_SHORTENING if sigma_factor > 0 else 0.0)
-        self._farthest = np.float32(_FARTHEST_REACH if sigma_factor > 0 else 0.0)
 
     def farthest_m(self, max_distance_m: float) -> float:
         """The longest range that `told` returns."""
-        return max_distance_m / (1.0 - float(self._farthest))
+        return max_distance_m / (1.0 - float(self._largest))
 
     def told(
         self, sigma: NDArray[np.float32], max_distance_m: float
@@ -53,7 +50,7 @@ class ScanCaution:
         """(N,) share of each pixel's distance to take off, and (N,) range within which it is an obstacle."""
         most_m, tells = np.float32(max_distance_m), self._tells(sigma)
         shortening = np.where(tells, np.minimum(_times(sigma, self._factor), self._largest), self._largest)
-        reach = np.minimum(_times(sigma, self._freeing), self._farthest)
+        reach = np.minimum(_times(sigma, self._freeing), self._largest)
         return shortening, np.where(tells, most_m / (1 - reach), most_m)
 
     def least_share(self, sigma: NDArray[np.float32]) -> NDArray[np.float32]:

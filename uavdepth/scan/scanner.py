@@ -62,9 +62,9 @@ class ObstacleScanner:
 
     An obstacle at depth d with a relative standard deviation sigma is told at d * (1 - sigma_factor * sigma),
     but for `LARGEST_SHORTENING`; a pixel is clear where depth shortened by `FREEING_FACTOR` as much still
-    reaches the ground or maximum distance. A surface beyond maximum distance that may so begin within it is
-    told where it begins by the first, or just within maximum distance: "unknown" would keep PX4 from moving
-    at all. Whether something is ground or lies in the height band is for d itself to say. Depth more doubtful
+    reaches the ground or maximum distance. A surface beyond maximum distance that may so begin within it, by
+    `LARGEST_SHORTENING` at most, is told where it begins by the first, or just within maximum distance.
+    Whether something is ground or lies in the height band is for d itself to say. Depth more doubtful
     than `max_relative_sigma` frees nothing: it is unknown when far, and an obstacle when near, because to
     ArduPilot unknown is as open as clear.
 
@@ -102,7 +102,7 @@ class ObstacleScanner:
         above_m: float = 1.5,
         min_pixels: int | None = None,
         ground_tolerance: float = GROUND_DEPTH_SHARE,
-        sigma_factor: float = 0.5,
+        sigma_factor: float = 0.25,
         mask: NDArray[np.bool_] | None = None,
         max_ground_slope_deg: float = 15.0,
         max_relative_sigma: float = 0.5,
