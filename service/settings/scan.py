@@ -49,7 +49,7 @@ class ScanSettings(Section):
         title="Caution about distances, standard deviations",
         description="Distances are told as d * (1 - sigma_factor * sigma), sigma being the network's own "
         "relative uncertainty, a quarter nearer at most, and a direction is clear only if it would be at "
-        "d * (1 - 4 * sigma_factor * sigma) too. 0 shortens nothing.",
+        "d * (1 - sigma) too. 0 shortens nothing and frees by d alone.",
     )
     max_ground_slope_deg: float = Field(
         default=15.0,

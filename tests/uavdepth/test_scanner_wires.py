@@ -86,7 +86,7 @@ class TestCaution:
         scanner = ObstacleScanner(camera, mount, sigma_factor=factor)
         scan = scanner.scan(*self.far_wall(camera, mount, level, 0.4, 24.0))
         assert scan.state[element(0)] == OBSTACLE
-        # Shortened by 0.05, 0.2 and a quarter; the first ends beyond maximum distance, just within it is told.
+        # Shortened by 0.05, 0.2 and a quarter; the first ends beyond maximum distance: just within it.
         told_m = {0.125: 19.98, 0.5: 0.8 * 24.0, 2.0: 0.75 * 24.0}[factor]
         assert scan.distance_m[element(0)] == pytest.approx(told_m, rel=0.02)
 
@@ -103,11 +103,18 @@ class TestCaution:
         )
         assert scan.distance_m[element(0)] == pytest.approx(0.75 * 21.0, rel=0.03)
 
-    def test_a_way_is_freed_by_four_times_the_doubt_that_shortens(self, camera, mount, level):
-        for factor, sigma, state in ((0.25, 0.15, CLEAR), (0.25, 0.19, OBSTACLE), (0.1, 0.4, CLEAR)):
-            scanner = ObstacleScanner(camera, mount, sigma_factor=factor)
+    @pytest.mark.parametrize("factor", [0.1, 0.25, 1.0, 1.5])
+    def test_a_way_is_freed_by_one_deviation_or_as_many_as_shorten(self, camera, mount, level, factor):
+        scanner = ObstacleScanner(camera, mount, sigma_factor=factor)
+        limit = (1 - 20 / 24) / max(1.0, factor)  # doubt at which a wall at 24 m may begin at 20 m
+        for sigma, state in ((0.9 * limit, CLEAR), (1.1 * limit, OBSTACLE)):
             scan = scanner.scan(*self.far_wall(camera, mount, level, sigma, 24.0))
             assert scan.state[element(0)] == state
+
+    def test_without_caution_doubt_closes_no_way(self, camera, mount, level):
+        scanner = ObstacleScanner(camera, mount, sigma_factor=0.0)
+        scan = scanner.scan(*self.far_wall(camera, mount, level, 0.45, 24.0))
+        assert scan.state[element(0)] == CLEAR
 
     @pytest.mark.parametrize("sigma", [0.51, 1.0, 3.0, np.inf, np.nan])
     def test_far_and_too_doubtful_to_tell_is_unknown(self, camera, mount, level, sigma):

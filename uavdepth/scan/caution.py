@@ -12,18 +12,20 @@ LARGEST_SHORTENING = 0.25
 stop the vehicle for good. What may so begin within maximum distance is told; what only may by more doubt
 than this is unknown."""
 
-FREEING_FACTOR = 4.0
-"""A way is freed by so many times the standard deviations that distances are shortened by: what is nearest in
-an element has erred towards the vehicle already, what is taken for free has not (docs/flight-evaluation.md).
+FREEING_SIGMAS = 1.0
+"""A way is freed by so many standard deviations, or by as many as shorten distances if these are more: what
+is nearest in an element has erred towards the vehicle already, what is taken for free has not
+(docs/flight-evaluation.md).
 """
 
 
 class ScanCaution:
     """Distances d with a relative standard deviation sigma: told as d * (1 - factor * sigma), and free only
-    where d * (1 - `FREEING_FACTOR` * factor * sigma) is.
+    where d * (1 - `FREEING_SIGMAS` * sigma) is.
 
     Args:
-        sigma_factor: standard deviations that distances are shortened by, 0 to 5; 0: not at all.
+        sigma_factor: standard deviations that distances are shortened by, 0 to 5; 0: neither is anything
+            shortened, nor is a way freed by less than its distance.
         max_relative_sigma: depth more doubtful than this frees nothing; above 0.
 
     Raises:
@@ -37,7 +39,7 @@ class ScanCaution:
             raise ScanError(f"max_relative_sigma is {max_relative_sigma}: above 0 is needed")
         self._factor = np.float32(sigma_factor)
         self._max_sigma = np.float32(max_relative_sigma)
-        self._freeing = np.float32(FREEING_FACTOR * sigma_factor)
+        self._freeing = np.float32(max(FREEING_SIGMAS, sigma_factor) if sigma_factor > 0 else 0.0)
         self._largest = np.float32(LARGEST_SHORTENING if sigma_factor > 0 else 0.0)
 
     def farthest_m(self, max_distance_m: float) -> float:

@@ -61,7 +61,7 @@ class ObstacleScanner:
       of what makes it clear, or tilted away from the flight level.
 
     An obstacle at depth d with a relative standard deviation sigma is told at d * (1 - sigma_factor * sigma),
-    but for `LARGEST_SHORTENING`; a pixel is clear where depth shortened by `FREEING_FACTOR` as much still
+    but for `LARGEST_SHORTENING`; a pixel is clear where depth shortened by `FREEING_SIGMAS` still
     reaches the ground or maximum distance. A surface beyond maximum distance that may so begin within it, by
     `LARGEST_SHORTENING` at most, is told where it begins by the first, or just within maximum distance.
     Whether something is ground or lies in the height band is for d itself to say. Depth more doubtful
