@@ -112,8 +112,8 @@ def test_recorded_depth_gives_the_wall_again_without_the_network(tmp_path: Path)
 
 
 def test_recorded_doubt_shortens_distances_again(tmp_path: Path) -> None:
-    for one in replayed(flown(tmp_path, sigma=0.2)):
-        assert one.result.scan.nearest_m == pytest.approx(WALL_M * (1 - 0.5 * 0.2), rel=0.04)
+    for one in replayed(flown(tmp_path, sigma=0.4)):
+        assert one.result.scan.nearest_m == pytest.approx(WALL_M * (1 - 0.25 * 0.4), rel=0.04)
 
 
 def test_two_replays_of_one_record_are_the_same_to_the_bit(tmp_path: Path) -> None:
