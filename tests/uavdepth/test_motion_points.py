@@ -223,6 +223,22 @@ def test_a_thing_that_moves_gives_no_points() -> None:
     assert np.median(np.abs(last.depth_m / WALL_M - 1)) < 0.03
 
 
+def test_tracks_that_stay_behind_after_a_gap_tell_nothing() -> None:
+    """Of a pattern that repeats itself the vehicle sees after a gap what it saw before, one repetition on."""
+
+    def after_the_gap(seen_from_s: float) -> tuple[PointHints, PointHints]:
+        points, motion = MotionPoints(CAMERA, CameraMount()), told(SIDEWAYS, 2.0)
+        before = fly(points, SIDEWAYS, tenths(0, 8), motion)[-1]
+        picture = wall_picture(CAMERA, SIDEWAYS(seen_from_s)[0], WALL_M)
+        return before, points.update(picture, 1_200_000_000, motion)
+
+    before, seen = after_the_gap(1.2)
+    assert len(seen) > 0.5 * len(before) > 30
+    assert np.median(np.abs(seen.depth_m / WALL_M - 1)) < 0.03
+    _, repeated = after_the_gap(0.8)
+    assert len(repeated) == 0
+
+
 def test_a_position_that_jumps_changes_nothing() -> None:
     motion = VehicleMotion()
     for step in range(41):

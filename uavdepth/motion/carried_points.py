@@ -22,6 +22,13 @@ _SEEN_GROWTH_PER_S = 0.005
 """What one gains that is seen where it should be, added up: corners creep along edges. After a minute of
 hover nothing is sure enough any more."""
 
+_SEEN_SIGMA_PX = 1.0
+_SEEN_SIGMA_RAD = 0.005
+"""How far off a followed corner is seen though all is well: by tracking, and by attitude and its time."""
+
+_ASTRAY_SIGMAS = 4.0
+"""A track that is farther from where its point should be has jumped to something else."""
+
 _PROVEN = 4
 """Measurements after which a point that is lost is carried on. Most of those that are lost sooner were no
 points at all but places where one edge passes behind another."""
@@ -47,6 +54,7 @@ class CarriedPoints:
         self._points = np.empty((0, 3))
         self._sigma = np.empty(0)
         self._offset_sigma = np.empty(0)
+        self._travel_m = np.empty(0)
         self._measured_ns = np.empty(0, dtype=np.int64)
         self._times = np.empty(0, dtype=np.int64)
 
@@ -60,6 +68,7 @@ class CarriedPoints:
                 self._points = (self._points + moved.offset_m) @ moved.rotation.T
                 # Errors of the velocity last, so those of the steps add up rather than average.
                 self._offset_sigma = self._offset_sigma + moved.sigma_m
+                self._travel_m = self._travel_m + moved.baseline_m
                 self._keep(now_ns - self._measured_ns <= self._carry_ns)
         self._at_ns = now_ns
 
@@ -93,6 +102,7 @@ class CarriedPoints:
         self._points = np.concatenate([self._points, points[new]])
         self._sigma = np.concatenate([self._sigma, relative_sigma[new]])
         self._offset_sigma = np.concatenate([self._offset_sigma, np.zeros(np.count_nonzero(new))])
+        self._travel_m = np.concatenate([self._travel_m, np.zeros(np.count_nonzero(new))])
         self._measured_ns = np.concatenate([self._measured_ns, np.full(np.count_nonzero(new), now_ns)])
         self._times = np.concatenate([self._times, times[new]])
 
@@ -121,6 +131,7 @@ class CarriedPoints:
         growth = _SEEN_GROWTH_PER_S * (now_ns - self._measured_ns) * 1e-9
         self._sigma = self._sigma + np.where(seen, growth, 0.0)
         self._offset_sigma = np.where(seen, found.offset_sigma_m, self._offset_sigma)
+        self._travel_m = np.where(seen, 0.0, self._travel_m)
         self._measured_ns = np.where(seen, now_ns, self._measured_ns)
 
     def hints(
@@ -132,6 +143,9 @@ class CarriedPoints:
     ) -> PointHints:
         """The points in the picture: at their track's pixel where it is followed, else where they should be.
 
+        A track that went astray tells nothing: after a gap between pictures it may follow the next dash of a
+        lane, and the point that it had is nearer than what is seen there. Its next measurement decides.
+
         Args:
             live_ids, live_pixels: (N,) and (N, 2) of the live tracks, camera pixels.
             now_ns: time of the picture, to which the points were moved.
@@ -141,14 +155,18 @@ class CarriedPoints:
         _, ours, theirs = np.intersect1d(self._ids, live_ids, assume_unique=True, return_indices=True)
         followed = np.zeros(len(self._ids), dtype=bool)
         followed[ours] = True
-        pixels[ours] = live_pixels[theirs]
         sigma = self._grown(now_ns, followed)
+        off_px = np.linalg.norm(live_pixels[theirs] - pixels[ours], axis=1)
+        strayed = np.zeros(len(self._ids), dtype=bool)
+        strayed[ours] = ~(off_px <= _ASTRAY_SIGMAS * self._seen_sigma_px(sigma)[ours])
+        pixels[ours] = live_pixels[theirs]
         size = np.array([self._camera.width, self._camera.height])
         with np.errstate(invalid="ignore"):
             inside = np.all((pixels >= -0.5) & (pixels < size - 0.5), axis=1)
         inside &= (self._points[:, 2] > 0.3) & (followed | (self._times >= _PROVEN))
         self._keep(inside)
-        pixels, sigma = pixels[inside], sigma[inside]
+        pixels, sigma, strayed = pixels[inside], sigma[inside], strayed[inside]
+        sigma = np.where(strayed, np.inf, sigma)
         order = np.argsort(sigma, kind="stable")[:MOST_POINTS]
         order = order[sigma[order] <= largest_sigma]
         chosen = pixels[order], self._points[order, 2], sigma[order]
@@ -160,6 +178,16 @@ class CarriedPoints:
         by_offset = self._offset_sigma / np.maximum(self._points[:, 2], 0.3)
         return np.asarray(np.sqrt(self._sigma**2 + growth**2 + by_offset**2))
 
+    def _seen_sigma_px(self, relative_sigma: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Standard deviation of where each point's corner is seen, pixels of the camera.
+
+        An error of depth shows by as much as the vehicle went since.
+        """
+        px_per_m = self._camera.fx / np.maximum(self._points[:, 2], 0.3)
+        moved = np.hypot(self._offset_sigma, relative_sigma * self._travel_m) * px_per_m
+        still = np.hypot(_SEEN_SIGMA_PX, _SEEN_SIGMA_RAD * self._camera.fx)
+        return np.asarray(np.hypot(moved, still))
+
     def _keep(self, kept: NDArray[np.bool_]) -> None:
-        for name in ("_ids", "_points", "_sigma", "_offset_sigma", "_measured_ns", "_times"):
+        for name in ("_ids", "_points", "_sigma", "_offset_sigma", "_travel_m", "_measured_ns", "_times"):
             setattr(self, name, getattr(self, name)[kept])
