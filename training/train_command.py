@@ -28,13 +28,16 @@ def train(
         "training_run"
     ),
     render: Annotated[bool, typer.Option(help="Render what is missing of the frames first.")] = False,
-    seeds: Annotated[
-        int, typer.Option(min=1, max=900, help="How many worlds of each scene to render, from seed 0.")
-    ] = 60,
+    seeds: Annotated[int, typer.Option(min=1, max=900, help="How many worlds of each scene to render.")] = 60,
+    first_seed: Annotated[int, typer.Option(min=0, max=899, help="Seed of the first of them.")] = 0,
     scenes: Annotated[str, typer.Option(help="Scenes to render, by commas.")] = (
         "city,suburb,park,mountain,forest,wall"
     ),
     frames_per_seed: Annotated[int, typer.Option(min=1, help="Frames rendered of each world.")] = 24,
+    thin_share: Annotated[
+        float,
+        typer.Option(min=0.0, max=1.0, help="Share of them taken right before poles, wires and trunks."),
+    ] = 0.0,
     minutes: Annotated[
         float | None,
         typer.Option(help=f"Length of the run in minutes of training; {DEFAULT_MINUTES:g} if neither."),
@@ -74,7 +77,7 @@ def train(
         raise TrainingSettingsError("--fine-tune needs --init: a run on a trained network")
     settings = _settings_maker(minutes, images, seed, precision, fine_tune)
     if render:
-        _render(data, scenes, seeds, frames_per_seed)
+        _render(data, scenes, range(first_seed, first_seed + seeds), frames_per_seed, thin_share)
     with needs_extra("train", "train"):
         import cv2
         import torch
@@ -88,13 +91,15 @@ def train(
     _run(trainer, output)
 
 
-def _render(data: Path, scenes: str, seeds: int, frames_per_seed: int) -> None:
+def _render(data: Path, scenes: str, seeds: range, frames_per_seed: int, thin_share: float) -> None:
     with needs_extra("train", "sim"):
         from training.data.rendering import RenderPlan, render_plan
         from training.data.seed_split import SeedSplit
 
     names = tuple(name.strip() for name in scenes.split(",") if name.strip())
-    plan = RenderPlan(data, names, SeedSplit.TRAIN, 0, seeds, frames_per_seed)
+    plan = RenderPlan(
+        data, names, SeedSplit.TRAIN, seeds.start, len(seeds), frames_per_seed, thin_share=thin_share
+    )
 
     def tell(scene: str, seed: int, frames: int) -> None:
         typer.echo(f"rendered {frames} frames of {scene}:{seed}")

@@ -26,6 +26,7 @@ from training.data.frame_store import read_frames, write_frames
 from training.data.pose_sampling import SAFE_CLEARANCE_M, sample_poses
 from training.data.rendering import RenderPlan
 from training.data.seed_split import SeedSplit
+from training.data.thin_approach import thin_rays
 from training.errors import TrainingDataError
 from training.normalization import MAX_DEPTH_M, depth_from_output, log_inverse_depth
 from uavdepth.attitude import Attitude
@@ -136,6 +137,54 @@ def test_pictures_are_taken_clear_of_obstacles_and_some_right_before_them() -> N
     assert min(clearances) >= SAFE_CLEARANCE_M
     assert sum(distance < 5.0 for distance in to_wall) > 5
     assert sum(abs(attitude.roll_rad) > 0.15 for _, attitude in poses) > 5
+
+
+class Posts(Corridor):
+    """Posts 0.2 m thick, 6 m apart, in the open."""
+
+    RADIUS_M = 0.1
+
+    def clearance_m(self, position_ned_m: Sequence[float]) -> float:
+        off = np.hypot(*(self._off(np.array(position_ned_m[:2]))))
+        return float(off) - self.RADIUS_M
+
+    def ray_distance_m(
+        self, origin_ned_m: NDArray[np.float64], direction_ned: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        flat = direction_ned[..., :2]
+        posts = np.stack(np.meshgrid(*2 * [np.arange(-60.0, 61.0, 6.0)]), -1).reshape(-1, 2)
+        to_posts = posts - np.asarray(origin_ned_m)[..., None, :2]
+        unit = flat / np.linalg.norm(flat, axis=-1, keepdims=True)
+        ahead = (to_posts * unit[..., None, :]).sum(-1)
+        aside = np.sqrt(np.maximum((to_posts**2).sum(-1) - ahead**2, 0.0))
+        met = (ahead > 0) & (aside < self.RADIUS_M)
+        level_m = np.where(met, ahead, np.inf).min(-1)
+        return np.asarray(level_m / np.linalg.norm(flat, axis=-1))
+
+    @staticmethod
+    def _off(place: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray((place + 3.0) % 6.0 - 3.0)
+
+
+def test_pictures_of_thin_things_are_taken_right_before_them_and_clear_of_them() -> None:
+    world = Posts()
+    poses = sample_poses(world, np.random.default_rng(3), 40, thin_share=1.0)
+    for position, attitude in poses:
+        assert world.clearance_m(position.tolist()) >= SAFE_CLEARANCE_M
+        bearings = np.radians(np.arange(-46.0, 46.0, 0.25)) + attitude.yaw_rad
+        rays = np.stack([np.cos(bearings), np.sin(bearings), np.zeros(len(bearings))], 1)
+        assert world.ray_distance_m(np.broadcast_to(position, rays.shape), rays).min() < 10.5
+
+
+def test_thin_is_what_has_something_farther_on_either_side() -> None:
+    step = math.radians(0.25)
+    distances = np.full(200, 10.0)
+    distances[50:54] = 4.0  # 7 cm
+    distances[100:160] = 4.0  # 1 m: no thin thing
+    distances[195:] = 4.0  # what is beside it is not known
+    assert thin_rays(distances, step).tolist() == [50, 51, 52, 53]
+    distances[50:54] = 8.5  # too near to what is behind
+    assert thin_rays(distances, step).tolist() == []
 
 
 @given(st.floats(0.5, 150.0), st.floats(50.0, 400.0))

@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from training.data.thin_approach import approach_thin
 from uavdepth.attitude import Attitude
 
 FLIGHT_DURATION_S = 40.0
@@ -57,12 +58,26 @@ class World(Protocol):
 SampledPose = tuple[NDArray[np.float64], Attitude]
 
 
-def sample_poses(world: World, rng: np.random.Generator, count: int) -> list[SampledPose]:
-    """`count` camera-carrying vehicle poses, each at least `SAFE_CLEARANCE_M` from everything."""
+def sample_poses(
+    world: World, rng: np.random.Generator, count: int, thin_share: float = 0.0
+) -> list[SampledPose]:
+    """`count` camera-carrying vehicle poses, each at least `SAFE_CLEARANCE_M` from everything.
+
+    Args:
+        world: to fly in.
+        rng: random numbers.
+        count: of poses.
+        thin_share: of them, taken right before poles, wires and trunks where there are any.
+    """
     flight = world.flight(int(rng.integers(1 << 30)), FLIGHT_DURATION_S)
     poses: list[SampledPose] = []
     while len(poses) < count:
         flown = flight.at(float(rng.uniform(0.0, FLIGHT_DURATION_S)))
+        if thin_share and rng.random() < thin_share:
+            found = _before_something_thin(world, rng, np.asarray(flown.position_ned_m, np.float64))
+            if found is not None:
+                poses.append((found[0], _tilted(rng, found[1])))
+                continue
         if rng.random() < APPROACH_SHARE:
             approach = _approach(world, rng, np.asarray(flown.position_ned_m, np.float64))
             if approach is None:
@@ -77,10 +92,7 @@ def sample_poses(world: World, rng: np.random.Generator, count: int) -> list[Sam
 def _approach(world: World, rng: np.random.Generator, start: NDArray[np.float64]) -> SampledPose | None:
     """A pose at a log-uniform distance before something that a level ray from around `start` meets."""
     for _ in range(_TRIES):
-        heights = _HEIGHT_RANGES_M[rng.choice(len(_HEIGHT_RANGES_M), p=_HEIGHT_SHARES)]
-        north, east = start[:2] + rng.normal(0.0, _APPROACH_SPREAD_M, 2)
-        ground = float(world.ground_height_m(north, east))
-        origin = np.array([north, east, -ground - rng.uniform(*heights)])
+        origin = _place_near(world, rng, start)
         yaw = rng.uniform(-math.pi, math.pi)
         heading = np.array([math.cos(yaw), math.sin(yaw), 0.0])
         if world.clearance_m(origin.tolist()) < SAFE_CLEARANCE_M:
@@ -95,6 +107,26 @@ def _approach(world: World, rng: np.random.Generator, start: NDArray[np.float64]
         look_yaw = yaw + rng.normal(0.0, math.radians(20.0))
         return position, Attitude(rng.normal(0.0, 0.06), rng.normal(-0.03, 0.08), look_yaw)
     return None
+
+
+def _before_something_thin(
+    world: World, rng: np.random.Generator, start: NDArray[np.float64]
+) -> SampledPose | None:
+    for _ in range(_TRIES):
+        origin = _place_near(world, rng, start)
+        if world.clearance_m(origin.tolist()) >= SAFE_CLEARANCE_M:
+            found = approach_thin(world, rng, origin, SAFE_CLEARANCE_M)
+            if found is not None:
+                return found
+    return None
+
+
+def _place_near(world: World, rng: np.random.Generator, start: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3,) NED metres, at a random height above the ground around `start`."""
+    heights = _HEIGHT_RANGES_M[rng.choice(len(_HEIGHT_RANGES_M), p=_HEIGHT_SHARES)]
+    north, east = start[:2] + rng.normal(0.0, _APPROACH_SPREAD_M, 2)
+    ground = float(world.ground_height_m(north, east))
+    return np.array([north, east, -ground - rng.uniform(*heights)])
 
 
 def _tilted(rng: np.random.Generator, attitude: Attitude) -> Attitude:

@@ -30,6 +30,7 @@ class RenderPlan:
         first_seed, seeds: range of seeds of each scene.
         frames_per_seed: pictures of each world.
         size: width and height in pixels.
+        thin_share: of the pictures, taken right before poles, wires and trunks.
     """
 
     root: Path
@@ -39,6 +40,7 @@ class RenderPlan:
     seeds: int
     frames_per_seed: int
     size: tuple[int, int] = RENDER_SIZE
+    thin_share: float = 0.0
 
     def worlds(self) -> Iterable[tuple[str, int]]:
         """Scene and seed of each world, seeds outermost, so that an unfinished store is balanced."""
@@ -63,7 +65,7 @@ def render_plan(plan: RenderPlan, done: Callable[[str, int, int], None] | None =
     for name, seed in plan.worlds():
         if has_frames(plan.root, name, seed):
             continue
-        frames = render_world(load_scene(name, seed), plan.frames_per_seed, plan.size)
+        frames = render_world(load_scene(name, seed), plan.frames_per_seed, plan.size, plan.thin_share)
         write_frames(plan.root, name, seed, frames)
         total += len(frames)
         if done is not None:
@@ -71,11 +73,13 @@ def render_plan(plan: RenderPlan, done: Callable[[str, int, int], None] | None =
     return total
 
 
-def render_world(scene: Scene, count: int, size: tuple[int, int] = RENDER_SIZE) -> list[NewFrame]:
+def render_world(
+    scene: Scene, count: int, size: tuple[int, int] = RENDER_SIZE, thin_share: float = 0.0
+) -> list[NewFrame]:
     """`count` pictures of a scene from random cameras; the same scene gives the same pictures."""
     rng = np.random.default_rng([zlib.crc32(scene.name.encode()), scene.seed])
     frames = []
-    for position, attitude in sample_poses(scene, rng, count):
+    for position, attitude in sample_poses(scene, rng, count, thin_share):
         camera, mount = sample_camera(rng, *size), sample_mount(rng)
         picture = scene.render(camera, mount, position.tolist(), attitude)
         height_m = scene.rangefinder_m(position.tolist())
