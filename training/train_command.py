@@ -104,7 +104,10 @@ def _render(data: Path, scenes: str, seeds: range, frames_per_seed: int, thin_sh
     def tell(scene: str, seed: int, frames: int) -> None:
         typer.echo(f"rendered {frames} frames of {scene}:{seed}")
 
-    render_plan(plan, tell)
+    def tell_left_out(scene: str, seed: int, reason: str) -> None:
+        typer.echo(f"left out {scene}:{seed}: {reason}", err=True)
+
+    render_plan(plan, tell, tell_left_out)
 
 
 SettingsMaker = Callable[["TrainingSettings | None"], "TrainingSettings"]

@@ -22,14 +22,15 @@ from training.data.camera_sampling import (
     sample_camera,
     sample_mount,
 )
-from training.data.frame_store import read_frames, write_frames
+from training.data.frame_store import NewFrame, read_frames, write_frames
 from training.data.pose_sampling import SAFE_CLEARANCE_M, sample_poses
-from training.data.rendering import RenderPlan
+from training.data.rendering import RenderPlan, render_plan
 from training.data.seed_split import SeedSplit
 from training.data.thin_approach import thin_rays
 from training.errors import TrainingDataError
 from training.normalization import MAX_DEPTH_M, depth_from_output, log_inverse_depth
 from uavdepth.attitude import Attitude
+from uavdepth.errors import SceneError
 from uavdepth.scenes import HELD_OUT_SCENES
 
 
@@ -56,6 +57,24 @@ def test_a_plan_for_training_refuses_a_world_kept_for_tests(tmp_path: Path) -> N
     plan = RenderPlan(tmp_path, ("city",), SeedSplit.TRAIN, 899, 2, 1)
     with pytest.raises(TrainingDataError, match="seed 900 belongs to validation"):
         list(plan.worlds())
+
+
+def test_a_world_without_room_to_fly_is_named_and_the_others_are_rendered(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def render(scene: tuple[str, int], *_: object) -> list[NewFrame]:
+        if scene[1] == 1:
+            raise SceneError("no clear path")
+        return [ground_frame()]
+
+    monkeypatch.setattr("training.data.rendering.load_scene", lambda name, seed: (name, seed))
+    monkeypatch.setattr("training.data.rendering.render_world", render)
+    plan = RenderPlan(tmp_path, ("city",), SeedSplit.TRAIN, 0, 3, 1)
+    with pytest.raises(SceneError, match="no clear path"):
+        render_plan(plan)
+    left_out: list[tuple[str, int, str]] = []
+    assert render_plan(plan, left_out=lambda *what: left_out.append(what)) == 1
+    assert left_out == [("city", 1, "no clear path")]
 
 
 def test_training_refuses_a_store_with_a_test_world(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from training.data.camera_sampling import sample_camera, sample_mount
 from training.data.frame_store import NewFrame, has_frames, write_frames
 from training.data.pose_sampling import sample_poses
 from training.data.seed_split import SeedSplit
+from uavdepth.errors import SceneError
 from uavdepth.scenes import Scene, load_scene
 
 RENDER_SIZE = (480, 240)
@@ -50,12 +51,18 @@ class RenderPlan:
                 yield scene, seed
 
 
-def render_plan(plan: RenderPlan, done: Callable[[str, int, int], None] | None = None) -> int:
+def render_plan(
+    plan: RenderPlan,
+    done: Callable[[str, int, int], None] | None = None,
+    left_out: Callable[[str, int, str], None] | None = None,
+) -> int:
     """Render what is missing of a plan. Returns the number of frames written.
 
     Args:
         plan: what to render; a world that is already complete is left alone.
         done: called with scene, seed and frames after each world.
+        left_out: called with scene, seed and reason of a world that has no room to fly in; without it
+            such a world ends the rendering.
 
     Raises:
         SceneError: a scene that cannot be built.
@@ -65,7 +72,14 @@ def render_plan(plan: RenderPlan, done: Callable[[str, int, int], None] | None =
     for name, seed in plan.worlds():
         if has_frames(plan.root, name, seed):
             continue
-        frames = render_world(load_scene(name, seed), plan.frames_per_seed, plan.size, plan.thin_share)
+        scene = load_scene(name, seed)
+        try:
+            frames = render_world(scene, plan.frames_per_seed, plan.size, plan.thin_share)
+        except SceneError as error:
+            if left_out is None:
+                raise
+            left_out(name, seed, str(error))
+            continue
         write_frames(plan.root, name, seed, frames)
         total += len(frames)
         if done is not None:
