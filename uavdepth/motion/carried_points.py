@@ -23,7 +23,7 @@ _SEEN_GROWTH_PER_S = 0.005
 hover nothing is sure enough any more."""
 
 _SEEN_SIGMA_PX = 1.0
-_SEEN_SIGMA_RAD = 0.005
+_SEEN_SIGMA_RAD = 0.01
 """How far off a followed corner is seen though all is well: by tracking, and by attitude and its time."""
 
 _ASTRAY_SIGMAS = 4.0
