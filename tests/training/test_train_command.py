@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -86,11 +87,12 @@ def test_a_run_has_one_length(tmp_path: Path) -> None:
 
 
 def test_the_command_renders_training_worlds_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    worlds: list[tuple[str, int]] = []
+    plans: list[RenderPlan] = []
 
-    def remember(plan: RenderPlan, tell: object) -> int:
-        worlds.extend(plan.worlds())
+    def remember(plan: RenderPlan, done: object, left_out: Callable[[str, int, str], None]) -> int:
+        plans.append(plan)
         make_store(plan.root, (("wall", 0),))
+        left_out("city", 7, "no room")
         return 3
 
     monkeypatch.setattr(training.data.rendering, "render_plan", remember)
@@ -98,6 +100,9 @@ def test_the_command_renders_training_worlds_only(tmp_path: Path, monkeypatch: p
     app = typer.Typer()
     app.command()(train)
     words = ["--data", str(tmp_path / "frames"), "--render", "--scenes", "wall,city", "--seeds", "2"]
+    words += ["--first-seed", "6", "--thin-share", "0.5"]
     done = CliRunner().invoke(app, [*words, "--output", str(tmp_path / "run")], catch_exceptions=False)
     assert done.exit_code == 0
-    assert worlds == [("wall", 0), ("city", 0), ("wall", 1), ("city", 1)]
+    assert "left out city:7: no room" in done.stderr
+    assert list(plans[0].worlds()) == [("wall", 6), ("city", 6), ("wall", 7), ("city", 7)]
+    assert plans[0].thin_share == 0.5
