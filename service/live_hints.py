@@ -49,6 +49,17 @@ class LiveHints:
         """What turns in flight show to be wrong with the focal length, in words, or None."""
         return None if self._points is None else self._points.suspicion
 
+    @property
+    def scale_sigma(self) -> float:
+        """What the last points leave uncertain of the scale of a picture; infinite where there are too few.
+
+        Most of their error is one that they share, that of the velocity: more points do not make it smaller.
+        Those of edges have one of their own besides, and no say in it.
+        """
+        if self._points is None or len(self._points.corners) < _FEWEST_POINTS:
+            return float("inf")
+        return float(np.median(self._points.corners.relative_sigma))
+
     def clear(self) -> None:
         """Forget all points and the motion."""
         self._motion.clear()
@@ -120,13 +131,3 @@ class LiveHints:
             return
         if self._motion.add_position(at_ns, position, velocity):
             self._position_ns = at_ns
-
-
-def sigma_of(points: PointHints | None) -> float:
-    """What points leave uncertain of the scale of a picture; infinite where there are too few.
-
-    Most of their error is one that they share, that of the velocity: more points do not make it smaller.
-    """
-    if points is None or len(points) < _FEWEST_POINTS:
-        return float("inf")
-    return float(np.median(points.relative_sigma))

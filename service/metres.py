@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from service.frame import Frame
 from service.ground_hints import LARGEST_TURN_RAD, GroundHints, KnownGround
-from service.live_hints import LiveHints, sigma_of
+from service.live_hints import LiveHints
 from service.measurement import DepthSource, Measurement, ScaleSource
 from service.scale_status import ScaleStatus
 from service.settings import Settings
@@ -126,7 +126,9 @@ class Metres:
         by_ground = math.inf
         if isinstance(ground, KnownGround) and "ground" in self._takes:
             by_ground = ground.sigma(telemetry.attitude)
-        by_points = sigma_of(points) if "points" in self._takes else math.inf
+        by_points = math.inf
+        if self._points is not None and points is not None and "points" in self._takes:
+            by_points = self._points.scale_sigma
         sources = tuple(
             name for name, sigma in (("ground", by_ground), ("points", by_points)) if sigma <= self._max_sigma
         )

@@ -33,7 +33,8 @@ from uavdepth.errors import (
 )
 from uavdepth.messages.obstacle_distance import encode_obstacle_distance, obstacle_words
 from uavdepth.model.hints import GroundHint, Hints, PointHints
-from uavdepth.motion.motion_points import MotionPoints, MotionPointSettings
+from uavdepth.motion.motion_point_settings import MotionPointSettings
+from uavdepth.motion.motion_points import MotionPoints
 from uavdepth.motion.vehicle_motion import MotionNoise, VehicleMotion
 from uavdepth.scale.estimator import ScaleEstimate, ScaleEstimator
 from uavdepth.scale.ground_scale import GroundScale, GroundScaler, vertical_height_m

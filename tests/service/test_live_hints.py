@@ -13,7 +13,7 @@ from program_fakes import LEVEL, make_settings, wall_over_ground
 from structlog.testing import capture_logs
 
 from service.frame import Frame
-from service.live_hints import LiveHints, sigma_of
+from service.live_hints import LiveHints
 from service.pipeline import SUSPICION_TEXT, Perception
 from service.settings import MotionSettings
 from service.telemetry import Telemetry
@@ -69,12 +69,13 @@ def every(period_s: float, until_s: float) -> list[float]:
 
 @pytest.mark.parametrize("period_s", [0.1, 0.3])
 def test_points_have_the_depth_of_the_wall_whether_pictures_are_fast_or_slow(period_s: float) -> None:
-    points = flown(live(), every(period_s, 1.0))
+    hints = live()
+    points = flown(hints, every(period_s, 1.0))
     assert points is not None
     assert len(points) > 40
     assert float(np.median(points.depth_m)) == pytest.approx(WALL_M, rel=0.05)
     # 0.1 m/s of doubt in 2 m/s.
-    assert 0.02 < sigma_of(points) < 0.15
+    assert 0.02 < hints.scale_sigma < 0.15
 
 
 def test_without_velocity_there_are_no_points() -> None:

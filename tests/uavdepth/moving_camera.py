@@ -23,6 +23,19 @@ def straight(velocity: tuple[float, float, float]) -> Place:
     return lambda t_s: ((north * t_s, east * t_s, down * t_s), velocity)
 
 
+def stops_after(velocity: tuple[float, float, float], stop_s: float) -> Place:
+    """Flight at one velocity, half a second of braking, then hover."""
+
+    def place(t_s: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        braking_s = min(max(t_s - stop_s, 0.0), 0.5)
+        travelled = min(t_s, stop_s) + braking_s - braking_s**2
+        north, east, down = (part * travelled for part in velocity)
+        v_north, v_east, v_down = (part * (1 - 2 * braking_s) for part in velocity)
+        return (north, east, down), (v_north, v_east, v_down)
+
+    return place
+
+
 def told(
     place: Place,
     until_s: float,

@@ -7,30 +7,18 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 import pytest
-from moving_camera import LEVEL, Place, straight, told, wall_picture
+from moving_camera import LEVEL, Place, stops_after, straight, told, wall_picture
 from numpy.typing import NDArray
 
 from uavdepth import CameraModel, CameraMount, ImageSizeError, PointHints
-from uavdepth.motion.motion_points import MotionPoints, MotionPointSettings
+from uavdepth.motion.motion_point_settings import MotionPointSettings
+from uavdepth.motion.motion_points import MotionPoints
 from uavdepth.motion.vehicle_motion import VehicleMotion
 
 CAMERA = CameraModel.from_fov(320, 160, 90)
 WALL_M = 10.0
 ALONG = (0.0, 2.0, 0.0)
 SIDEWAYS = straight(ALONG)
-
-
-def stops_after(velocity: tuple[float, float, float], stop_s: float) -> Place:
-    """Flight at one velocity, half a second of braking, then hover."""
-
-    def place(t_s: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        braking_s = min(max(t_s - stop_s, 0.0), 0.5)
-        travelled = min(t_s, stop_s) + braking_s - braking_s**2
-        north, east, down = (part * travelled for part in velocity)
-        v_north, v_east, v_down = (part * (1 - 2 * braking_s) for part in velocity)
-        return (north, east, down), (v_north, v_east, v_down)
-
-    return place
 
 
 def fly(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -13,8 +12,10 @@ from numpy.typing import NDArray
 from uavdepth.camera import CameraModel, CameraMount
 from uavdepth.errors import ImageSizeError
 from uavdepth.model.hints import PointHints
-from uavdepth.motion.carried_points import CarriedPoints
+from uavdepth.motion.carried_points import MOST_POINTS, CarriedPoints
 from uavdepth.motion.feature_tracks import MOST_FRAMES, FeatureTracks
+from uavdepth.motion.motion_point_settings import MotionPointSettings
+from uavdepth.motion.near_edges import NearEdges
 from uavdepth.motion.resection import resect
 from uavdepth.motion.triangulation import triangulate
 from uavdepth.motion.turn_check import TurnCheck
@@ -50,39 +51,6 @@ _MOST_VIEWS = 4
 """Besides the newest; more of them, spread over the same time, add work but hardly any certainty."""
 
 
-@dataclass(frozen=True)
-class MotionPointSettings:
-    """What a point must be to be believed.
-
-    Args:
-        pixel_sigma: standard deviation of a tracked corner, pixels (of a picture at most 640 wide).
-        drift_sigma: what is added to it for each 10 pictures that a corner was followed.
-        least_views: pictures besides the newest that must have seen a point.
-        longest_window_s: oldest picture that is used.
-        least_parallax_rad: smallest angle between two rays to a point.
-        largest_sigma: largest relative standard deviation of depth.
-        largest_carried_sigma: the same for one that was measured earlier.
-        largest_residual: largest re-projection error (root mean square), in standard deviations.
-        nearest_m, farthest_m: depths that are believed.
-        model_sigma: relative error of depth that noise does not explain: calibration, mount, time stamps.
-        carry_s: how long a point is carried along that is neither measured any more nor, in a hover, seen
-            where it should be.
-    """
-
-    pixel_sigma: float = 0.3
-    drift_sigma: float = 0.2
-    least_views: int = 2
-    longest_window_s: float = 1.5
-    least_parallax_rad: float = math.radians(0.6)
-    largest_sigma: float = 0.2
-    largest_carried_sigma: float = 0.35
-    largest_residual: float = 1.8
-    nearest_m: float = 0.5
-    farthest_m: float = 80.0
-    model_sigma: float = 0.02
-    carry_s: float = 2.0
-
-
 class MotionPoints:
     """Follows corners from picture to picture and measures their depth by the way the vehicle went.
 
@@ -94,7 +62,8 @@ class MotionPoints:
     most of them are seen where the vehicle's motion puts them. Of flight along the optical axis comes
     nothing near the point it heads for. Objects that move are told by residuals across their epipolar
     lines; one that moves along them (a car ahead on one's own course) is not told from a thing that
-    stands at another depth.
+    stands at another depth. Near edges that are no corners are measured besides (`NearEdges`); what moves
+    by itself is not told from what stands there.
 
     Args:
         camera, mount: the camera and how it sits on the vehicle.
@@ -113,8 +82,10 @@ class MotionPoints:
         self._tracks = FeatureTracks()
         self._times: deque[int] = deque(maxlen=MOST_FRAMES)
         self._carried = CarriedPoints(camera, self.settings.carry_s)
+        self._edges = NearEdges(camera, mount)
         self._turns = TurnCheck()
         self._last = _no_points()
+        self._last_corners = 0
         self._is_behind = False
         self._unmeasured: VehicleMotion | None = None
         self._measured_ns: int | None = None
@@ -124,12 +95,19 @@ class MotionPoints:
         """What turns in flight show to be wrong with the focal length, in words, or None."""
         return self._turns.suspicion
 
+    @property
+    def corners(self) -> PointHints:
+        """The last points but those of edges: what they leave uncertain is the scale of the picture."""
+        count, last = self._last_corners, self._last
+        return PointHints(last.pixels[:count], last.depth_m[:count], last.relative_sigma[:count])
+
     def clear(self) -> None:
         """Forget all tracks and points."""
         self._tracks.clear()
         self._times.clear()
         self._carried.clear()
-        self._last = _no_points()
+        self._edges.clear()
+        self._last, self._last_corners = _no_points(), 0
         self._is_behind, self._unmeasured, self._measured_ns = False, None, None
 
     def update(self, image_bgr: NDArray[np.uint8], captured_ns: int, motion: VehicleMotion) -> PointHints:
@@ -186,6 +164,7 @@ class MotionPoints:
                 self._measured_ns = captured_ns
             if views and stands_out > _BASELINE_SIGMAS:
                 self._measure(captured_ns, motion, views)
+                self._measure_edges(motion)
             if stands_out <= _SLOW_SIGMAS:
                 self._confirm(captured_ns, motion)
         self._tracks.renew()
@@ -201,15 +180,21 @@ class MotionPoints:
                 points = np.concatenate([rays, np.ones((len(rays), 1))], axis=1) @ turn.rotation.T
                 expected = self._small(self.camera.projected(points))
         self._tracks.update(grey, expected)
+        self._edges.see(grey, captured_ns)
         self._times.append(captured_ns)
 
     def _points(self, captured_ns: int, motion: VehicleMotion) -> PointHints:
+        self._last_corners = 0
         if not motion.knows(captured_ns):
             return _no_points()
         self._unmeasured = motion
         ids, pixels = self._tracks.ids, self._pixels(self._tracks.positions[-1])
         self._carried.move(captured_ns, motion, self.mount)
-        return self._carried.hints(ids, pixels, captured_ns, self.settings.largest_carried_sigma)
+        self._edges.move(captured_ns, motion)
+        largest_sigma = self.settings.largest_carried_sigma
+        corners = self._carried.hints(ids, pixels, captured_ns, largest_sigma)
+        self._last_corners = len(corners)
+        return _together(corners, self._edges.hints(largest_sigma, MOST_POINTS - len(corners)))
 
     def _views(self, captured_ns: int, motion: VehicleMotion) -> list[tuple[int, CameraMotion]]:
         """Rows of earlier pictures to measure with, each twice as old as the next, and the motion to them."""
@@ -258,6 +243,17 @@ class MotionPoints:
         # A track that does not fit a still world is not one of its points, whatever it was before.
         self._carried.drop(self._tracks.ids[several[found.residual > settings.largest_residual]])
 
+    def _measure_edges(self, motion: VehicleMotion) -> None:
+        _, tracks, points, _ = self._carried.followed(self._tracks.ids)
+        positions = self._tracks.positions
+
+        def seen_at(at_ns: int) -> NDArray[np.float64] | None:
+            if len(positions) != len(self._times) or at_ns not in self._times:
+                return None
+            return self._rays(positions[self._times.index(at_ns)][tracks])
+
+        self._edges.measure(motion, points, seen_at)
+
     def _confirm(self, captured_ns: int, motion: VehicleMotion) -> None:
         """See whether points that were measured earlier are where they were."""
         ids, tracks, points, drift_m = self._carried.followed(self._tracks.ids)
@@ -281,6 +277,14 @@ class MotionPoints:
 
     def _rays(self, small: NDArray[np.float32]) -> NDArray[np.float64]:
         return self.camera.straightened(self._pixels(small))
+
+
+def _together(corners: PointHints, edges: PointHints) -> PointHints:
+    return PointHints(
+        np.concatenate([corners.pixels, edges.pixels]),
+        np.concatenate([corners.depth_m, edges.depth_m]),
+        np.concatenate([corners.relative_sigma, edges.relative_sigma]),
+    )
 
 
 def _no_points() -> PointHints:

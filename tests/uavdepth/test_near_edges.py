@@ -1,0 +1,182 @@
+"""Edges near the vehicle: a plain post before a painted wall has no corner, and is measured by its edges."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+import pytest
+from moving_camera import Place, stops_after, straight, told, wall_picture
+from numpy.typing import NDArray
+
+from uavdepth import Attitude, CameraModel, CameraMount, PointHints
+from uavdepth.motion.edge_search import FARTHEST_M, EdgeView, measure_edges
+from uavdepth.motion.motion_points import MotionPoints
+from uavdepth.motion.vehicle_motion import CameraMotion, MotionNoise, VehicleMotion
+
+CAMERA = CameraModel.from_fov(320, 160, 90)
+WALL_M = 12.0
+POST_M = 3.0
+POST_WIDTH_M = 0.2
+
+
+def post_picture(
+    camera: CameraModel,
+    place: tuple[float, float, float],
+    yaw_rad: float = 0.0,
+    post_east_m: float = 1.0,
+    post_m: float = POST_M,
+    width_m: float = POST_WIDTH_M,
+) -> NDArray[np.uint8]:
+    """The painted wall, and before it one upright post of one dull colour, endless up and down."""
+    scale = 4
+    fine = camera.scaled(camera.width * scale, camera.height * scale)
+    image = wall_picture(camera, place, WALL_M, yaw_rad)
+    turn = Attitude(0.0, 0.0, yaw_rad).ned_from_body @ CameraMount().body_from_camera
+    rays = fine.normalized_rays.astype(np.float64) @ turn.T
+    reach = (post_m - place[0]) / np.maximum(rays[..., 0], 0.05)
+    east = place[1] + reach * rays[..., 1]
+    covered = (np.abs(east - post_east_m) < width_m / 2) & (reach > 0)
+    share = cv2.resize(
+        covered.astype(np.float32), (camera.width, camera.height), interpolation=cv2.INTER_AREA
+    )
+    return np.asarray(np.rint(image * (1 - share[..., None]) + 30.0 * share[..., None]), np.uint8)
+
+
+def fly(
+    points: MotionPoints,
+    place: Place,
+    seconds: float,
+    motion: VehicleMotion | None = None,
+    picture: Callable[[float], NDArray[np.uint8]] | None = None,
+    yaw_rad: Callable[[float], float] = lambda t_s: 0.0,
+) -> list[PointHints]:
+    """Points of pictures of ten a second."""
+    heard = motion or told(place, seconds + 1, yaw_rad)
+    shown = picture or (lambda t_s: post_picture(points.camera, place(t_s)[0], yaw_rad(t_s)))
+    return [
+        points.update(shown(step / 10), step * 100_000_000, heard) for step in range(round(seconds * 10) + 1)
+    ]
+
+
+def near(found: PointHints, limit_m: float = 6.0) -> PointHints:
+    """Those that can only be of the post."""
+    chosen = found.depth_m < limit_m
+    return PointHints(found.pixels[chosen], found.depth_m[chosen], found.relative_sigma[chosen])
+
+
+@pytest.mark.parametrize("velocity", [(0.0, 1.5, 0.0), (0.5, 1.2, 0.0), (0.5, -1.0, 0.3)])
+def test_a_plain_post_before_a_wall_is_measured(velocity: tuple[float, float, float]) -> None:
+    place = straight(velocity)
+    found = fly(MotionPoints(CAMERA, CameraMount()), place, 1.2)[-1]
+    post = near(found)
+    position = place(1.2)[0]
+    depth_m = POST_M - position[0]
+    column = CAMERA.cx + CAMERA.fx * (1.0 - position[1]) / depth_m
+    half_px = CAMERA.fx * POST_WIDTH_M / 2 / depth_m
+    assert len(post) >= 6
+    np.testing.assert_allclose(post.depth_m, depth_m, rtol=0.1)
+    assert np.all(np.abs(np.abs(post.pixels[:, 0] - column) - half_px) < 4.0)
+    assert np.all(np.abs(post.depth_m / depth_m - 1) < 3 * post.relative_sigma)
+    assert post.pixels[:, 1].max() - post.pixels[:, 1].min() > 0.4 * CAMERA.height
+
+
+def test_without_its_edges_the_post_is_not_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("uavdepth.motion.near_edges.measure_edges", lambda *args: None)
+    place = straight((0.0, 1.5, 0.0))
+    assert len(near(fly(MotionPoints(CAMERA, CameraMount()), place, 1.2)[-1])) <= 2
+
+
+def test_a_lens_that_bends_is_taken_into_account() -> None:
+    bent = CameraModel(320, 160, 160.0, 160.0, 159.5, 79.5, (-0.2, 0.05, 0.0, 0.0))
+    place = straight((0.0, 1.5, 0.0))
+    post = near(fly(MotionPoints(bent, CameraMount()), place, 1.2)[-1])
+    assert len(post) >= 6
+    np.testing.assert_allclose(post.depth_m, POST_M, rtol=0.1)
+    expected = bent.projected(np.array([[1.0 - 1.8, 0.0, POST_M]]))[0, 0]
+    middle = post.pixels[np.abs(post.pixels[:, 1] - bent.cy) < 20, 0]
+    assert np.all(np.abs(middle - expected) < 10)
+
+
+def test_an_attitude_that_errs_is_made_right_by_the_corners() -> None:
+    place = straight((0.0, 1.5, 0.0))
+    rng = np.random.default_rng(11)
+    motion = VehicleMotion(MotionNoise())
+    for step in range(60):
+        error = rng.normal(0.0, math.radians(0.3), 3)
+        motion.add_attitude(step * 50_000_000, Attitude(*error))
+        motion.add_position(step * 50_000_000, *place(step / 20))
+    post = near(fly(MotionPoints(CAMERA, CameraMount()), place, 1.4, motion)[-1])
+    assert len(post) >= 6
+    np.testing.assert_allclose(np.median(post.depth_m), POST_M, rtol=0.1)
+
+
+def test_what_is_farther_than_the_limit_is_never_told_near() -> None:
+    """A wall at 12 m with a row of like bars on it: repeated edges, of which none may look near."""
+    place = straight((0.0, 1.5, 0.0))
+
+    def bars(t_s: float) -> NDArray[np.uint8]:
+        image = wall_picture(CAMERA, place(t_s)[0], WALL_M)
+        for east_m in np.arange(-14.0, 16.0, 0.75):
+            image = np.minimum(
+                image, post_picture(CAMERA, place(t_s)[0], post_east_m=east_m, post_m=WALL_M, width_m=0.3)
+            )
+        return image
+
+    for found in fly(MotionPoints(CAMERA, CameraMount()), place, 1.2, picture=bars):
+        assert not len(found) or found.depth_m.min() > FARTHEST_M
+
+
+def test_in_a_hover_none_are_measured_and_those_there_were_last_a_second(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    place = stops_after((0.0, 1.5, 0.0), 1.0)
+    found = fly(MotionPoints(CAMERA, CameraMount()), place, 4.0)
+    monkeypatch.setattr("uavdepth.motion.near_edges.measure_edges", lambda *args: None)
+    corners = fly(MotionPoints(CAMERA, CameraMount()), place, 4.0)
+    assert len(found[10]) >= len(corners[10]) + 6
+    assert len(found[40]) == len(corners[40])
+
+
+def test_edges_come_nearer_as_the_vehicle_does() -> None:
+    place = straight((0.5, -1.0, 0.0))
+    points = MotionPoints(CAMERA, CameraMount())
+    for step, found in enumerate(fly(points, place, 1.2)):
+        post = near(found)
+        if len(post):
+            np.testing.assert_allclose(post.depth_m, POST_M - step / 20, rtol=0.12)
+
+
+def test_a_jump_of_the_attitude_leaves_no_edges() -> None:
+    place = straight((0.0, 1.5, 0.0))
+    motion = VehicleMotion(MotionNoise())
+    for step in range(40):
+        yaw = 0.0 if step < 23 else 0.6
+        motion.add_attitude(step * 50_000_000, Attitude(0.0, 0.0, yaw))
+        motion.add_position(step * 50_000_000, *place(step / 20))
+    found = fly(MotionPoints(CAMERA, CameraMount()), place, 1.2, motion)
+    assert len(near(found[11])) >= 6
+    assert len(found[12]) == 0
+
+
+def _view(offset_m: tuple[float, float, float]) -> EdgeView:
+    moved = CameraMotion(np.eye(3), np.array(offset_m), 0.01)
+    grey = cv2.cvtColor(post_picture(CAMERA, (0.0, -offset_m[0], 0.0)), cv2.COLOR_BGR2GRAY)
+    return EdgeView(np.asarray(grey, np.uint8), moved)
+
+
+def test_one_view_and_too_short_a_baseline_measure_nothing() -> None:
+    grey = np.asarray(cv2.cvtColor(post_picture(CAMERA, (0.0, 0.0, 0.0)), cv2.COLOR_BGR2GRAY), np.uint8)
+    assert measure_edges(grey, [_view((0.5, 0.0, 0.0))], CAMERA) is None
+    assert measure_edges(grey, [_view((0.2, 0.0, 0.0)), _view((0.1, 0.0, 0.0))], CAMERA) is None
+    found = measure_edges(grey, [_view((0.5, 0.0, 0.0)), _view((0.25, 0.0, 0.0))], CAMERA)
+    assert found is not None
+    np.testing.assert_allclose(found.points[:, 2], POST_M, rtol=0.08)
+
+
+def test_a_picture_without_texture_measures_nothing() -> None:
+    plain = np.full((160, 320), 90, np.uint8)
+    views = [EdgeView(plain, CameraMotion(np.eye(3), np.array([b, 0.0, 0.0]), 0.01)) for b in (0.5, 0.3)]
+    assert measure_edges(plain, views, CAMERA) is None
