@@ -13,6 +13,7 @@ from service.settings.motion import MotionSettings
 from service.telemetry import Telemetry
 from uavdepth.camera import CameraModel, CameraMount
 from uavdepth.model.hints import PointHints
+from uavdepth.motion.motion_point_settings import MotionPointSettings
 from uavdepth.motion.motion_points import MotionPoints
 from uavdepth.motion.vehicle_motion import VehicleMotion
 
@@ -37,7 +38,8 @@ class LiveHints:
     """
 
     def __init__(self, camera: CameraModel, mount: CameraMount, settings: MotionSettings) -> None:
-        self._points = MotionPoints(camera, mount) if settings.points else None
+        measured = MotionPointSettings(edges=settings.edges)
+        self._points = MotionPoints(camera, mount, measured) if settings.points else None
         self._motion = VehicleMotion(settings.noise)
         self._attitude_ns: int | None = None
         self._position_ns: int | None = None

@@ -21,6 +21,11 @@ class MotionSettings(Section):
         "instead of it, while the vehicle moves, in a hover while they stay in view, and for 2 s without "
         "either.",
     )
+    edges: bool = Field(
+        default=True,
+        title="Measure near edges",
+        description="Measures edges within 8 m besides: posts, roofs and wires have no corners to follow.",
+    )
     attitude_sigma_deg: float = Field(
         default=0.5,
         ge=0.05,

@@ -189,14 +189,15 @@ def _costs(
 ) -> tuple[Field, Field]:
     """(N, D) how unlike each edge looks at each inverse depth: over all views, and in the worst of them."""
     height, width = grey.shape
-    across, along = (part.ravel() for part in np.meshgrid(_ACROSS, _ALONG))
+    across, along = (part.reshape(-1, 1, 1) for part in np.meshgrid(_ACROSS, _ALONG))
+    # Samples first, then edges, then depths: numpy is quick along the last axis only.
     right = across * edges.normal[:, :1] - along * edges.normal[:, 1:]
     down = across * edges.normal[:, 1:] + along * edges.normal[:, :1]
-    column, row = edges.column.astype(np.float32), edges.row.astype(np.float32)
-    here = _sampled(grey, column[:, None] + right, row[:, None] + down)
-    deviation = np.abs(here).mean(axis=1) + np.float32(1.0)
-    x = (column[:, None] - np.float32(camera.cx)) / np.float32(camera.fx)
-    y = (row[:, None] - np.float32(camera.cy)) / np.float32(camera.fy)
+    column, row = edges.column.astype(np.float32)[:, None], edges.row.astype(np.float32)[:, None]
+    here = _sampled(grey, column + right, row + down)
+    deviation = np.abs(here).mean(axis=0) + np.float32(1.0)
+    x = (column - np.float32(camera.cx)) / np.float32(camera.fx)
+    y = (row - np.float32(camera.cy)) / np.float32(camera.fy)
     matrix = camera.matrix
     shape = (len(edges), len(inverse))
     total, count = np.zeros(shape, np.float32), np.zeros(shape, np.int32)
@@ -212,12 +213,9 @@ def _costs(
         reach = _ALONG[-1] * stretch
         inside = (u >= reach) & (u <= width - 1 - reach) & (v >= reach) & (v <= height - 1 - reach)
         inside &= stretch < _LARGEST_STRETCH
-        there = _sampled(
-            turned,
-            u[..., None] + right[:, None] * stretch[:, None],
-            v[..., None] + down[:, None] * stretch[:, None],
-        )
-        unlike = np.abs(there - here[:, None]).mean(axis=2) / deviation[:, None]
+        there = _sampled(turned, u + right * stretch, v + down * stretch)
+        there -= here
+        unlike = np.abs(there, out=there).mean(axis=0) / deviation
         total += np.where(inside, unlike, np.float32(0.0))
         worst = np.maximum(worst, np.where(inside, unlike, np.float32(0.0)))
         count += inside
@@ -225,16 +223,17 @@ def _costs(
 
 
 def _sampled(picture: Grey, x: Field, y: Field) -> Field:
-    """Grey values at pixels (..., P), less the mean of the last axis."""
-    rows, columns = len(x), int(np.prod(x.shape[1:]))
+    """Grey values at pixels (P, N, D), less the mean of the first axis."""
+    lines = -1, x.shape[-1]
     values = cv2.remap(
         picture,
-        np.asarray(x, np.float32).reshape(rows, columns),
-        np.asarray(y, np.float32).reshape(rows, columns),
+        np.asarray(x, np.float32).reshape(lines),
+        np.asarray(y, np.float32).reshape(lines),
         cv2.INTER_LINEAR,
     )
     grey = values.reshape(x.shape).astype(np.float32)
-    return np.asarray(grey - grey.mean(axis=-1, keepdims=True), np.float32)
+    grey -= grey.mean(axis=0)
+    return grey
 
 
 def _between_steps(cost: Field, best: NDArray[np.intp]) -> Field:

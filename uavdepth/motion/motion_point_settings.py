@@ -23,6 +23,7 @@ class MotionPointSettings:
         model_sigma: relative error of depth that noise does not explain: calibration, mount, time stamps.
         carry_s: how long a point is carried along that is neither measured any more nor, in a hover, seen
             where it should be.
+        edges: near edges are measured besides.
     """
 
     pixel_sigma: float = 0.3
@@ -37,3 +38,4 @@ class MotionPointSettings:
     farthest_m: float = 80.0
     model_sigma: float = 0.02
     carry_s: float = 2.0
+    edges: bool = True

@@ -164,7 +164,8 @@ class MotionPoints:
                 self._measured_ns = captured_ns
             if views and stands_out > _BASELINE_SIGMAS:
                 self._measure(captured_ns, motion, views)
-                self._measure_edges(motion)
+                if self.settings.edges:
+                    self._measure_edges(motion)
             if stands_out <= _SLOW_SIGMAS:
                 self._confirm(captured_ns, motion)
         self._tracks.renew()
