@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from uavdepth import Attitude, CameraModel, CameraMount, PointHints
 from uavdepth.motion.edge_search import FARTHEST_M, EdgeView, measure_edges
+from uavdepth.motion.motion_point_settings import MotionPointSettings
 from uavdepth.motion.motion_points import MotionPoints
 from uavdepth.motion.vehicle_motion import CameraMotion, MotionNoise, VehicleMotion
 
@@ -83,10 +84,15 @@ def test_a_plain_post_before_a_wall_is_measured(velocity: tuple[float, float, fl
     assert post.pixels[:, 1].max() - post.pixels[:, 1].min() > 0.4 * CAMERA.height
 
 
-def test_without_its_edges_the_post_is_not_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("uavdepth.motion.near_edges.measure_edges", lambda *args: None)
+def test_without_edges_the_post_is_not_seen_and_the_corners_are_the_same() -> None:
     place = straight((0.0, 1.5, 0.0))
-    assert len(near(fly(MotionPoints(CAMERA, CameraMount()), place, 1.2)[-1])) <= 2
+    both = MotionPoints(CAMERA, CameraMount())
+    found = fly(both, place, 1.2)[-1]
+    corners = fly(MotionPoints(CAMERA, CameraMount(), MotionPointSettings(edges=False)), place, 1.2)[-1]
+    assert len(near(corners)) <= 2
+    assert len(found) > len(corners)
+    for name in ("pixels", "depth_m", "relative_sigma"):
+        np.testing.assert_array_equal(getattr(both.corners, name), getattr(corners, name))
 
 
 def test_a_lens_that_bends_is_taken_into_account() -> None:
@@ -129,13 +135,10 @@ def test_what_is_farther_than_the_limit_is_never_told_near() -> None:
         assert not len(found) or found.depth_m.min() > FARTHEST_M
 
 
-def test_in_a_hover_none_are_measured_and_those_there_were_last_a_second(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_in_a_hover_none_are_measured_and_those_there_were_last_a_second() -> None:
     place = stops_after((0.0, 1.5, 0.0), 1.0)
     found = fly(MotionPoints(CAMERA, CameraMount()), place, 4.0)
-    monkeypatch.setattr("uavdepth.motion.near_edges.measure_edges", lambda *args: None)
-    corners = fly(MotionPoints(CAMERA, CameraMount()), place, 4.0)
+    corners = fly(MotionPoints(CAMERA, CameraMount(), MotionPointSettings(edges=False)), place, 4.0)
     assert len(found[10]) >= len(corners[10]) + 6
     assert len(found[40]) == len(corners[40])
 
@@ -180,3 +183,13 @@ def test_a_picture_without_texture_measures_nothing() -> None:
     plain = np.full((160, 320), 90, np.uint8)
     views = [EdgeView(plain, CameraMotion(np.eye(3), np.array([b, 0.0, 0.0]), 0.01)) for b in (0.5, 0.3)]
     assert measure_edges(plain, views, CAMERA) is None
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_pictures_that_have_nothing_to_do_with_each_other_measure_next_to_nothing(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    noise = [cv2.GaussianBlur(rng.uniform(0, 255, (160, 320)), (0, 0), 2.0) for _ in range(4)]
+    grey, *others = (np.clip((part - 127) * 6 + 127, 0, 255).astype(np.uint8) for part in noise)
+    moves = [CameraMotion(np.eye(3), np.array([b, 0.0, 0.0]), 0.01) for b in (0.6, 0.35, 0.2)]
+    found = measure_edges(grey, [EdgeView(*pair) for pair in zip(others, moves, strict=True)], CAMERA)
+    assert found is None or len(found.points) <= 4
