@@ -193,3 +193,21 @@ def test_pictures_that_have_nothing_to_do_with_each_other_measure_next_to_nothin
     moves = [CameraMotion(np.eye(3), np.array([b, 0.0, 0.0]), 0.01) for b in (0.6, 0.35, 0.2)]
     found = measure_edges(grey, [EdgeView(*pair) for pair in zip(others, moves, strict=True)], CAMERA)
     assert found is None or len(found.points) <= 4
+
+
+@pytest.mark.parametrize("far_m", [12.0, 23.0, 37.0, 61.0])
+@pytest.mark.parametrize("apart_px", [9.0, 12.3, 17.0])
+def test_rows_of_windows_far_away_are_not_told_near(far_m: float, apart_px: float) -> None:
+    """Climbing before a facade: with steps of its period over the like, it looks as if near and moving on."""
+    baselines = (0.51, 0.34, 0.17)
+
+    def rows(shift_px: float) -> NDArray[np.uint8]:
+        fine = (np.arange(160 * 8) + 0.5) / 8 - 0.5 + shift_px
+        line = np.where(np.mod(fine, apart_px) < 0.45 * apart_px, 60.0, 180.0).reshape(160, 8).mean(axis=1)
+        return np.repeat(np.rint(line).astype(np.uint8)[:, None], 320, axis=1)
+
+    views = [
+        EdgeView(rows(CAMERA.fy * b / far_m), CameraMotion(np.eye(3), np.array([0.0, -b, 0.0]), 0.01))
+        for b in baselines
+    ]
+    assert measure_edges(rows(0.0), views, CAMERA) is None

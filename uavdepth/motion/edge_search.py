@@ -13,6 +13,7 @@ edge farther away is not taken for one of them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -35,7 +36,7 @@ aliased picture shows now this row and now that one, were told a third too near,
 _CELL_PX = 8
 """The strongest edge of so many pixels squared is looked for, and no other."""
 
-_MOST_EDGES = 300
+_MOST_EDGES = 250
 _LEAST_GRADIENT = 3.0
 """Grey values a pixel, along the way the edge moves."""
 
@@ -47,14 +48,19 @@ _ALONG = np.arange(-3.0, 4.0, dtype=np.float32)
 """Samples about an edge, pixels. Few across: what lies behind it moves otherwise."""
 
 _MARGIN_PX = 6
-_STEP_PX = 2.0
-_STEPS = (24, 64)
+_STEP_PX = 1.2
+_FAR_STEP_PX = 0.5
+"""Between the depths that are tried. Those beyond `FARTHEST_M` are tried to be ruled out: of a facade's
+rows of windows each looks like the next, and the true one shows only where it fits exactly."""
+
+_MOST_STEPS = 100
 _LARGEST_COST = 0.6
 """Mean difference of the samples over their own mean deviation, all pictures together."""
 
 _LARGEST_SINGLE_COST = 1.0
-_LEAST_RATIO = 1.2
-"""Of the cost of the next best depth, `_APART_PX` or more away, to the best one's."""
+_LEAST_RATIO, _LEAST_LEAD = 1.2, 0.15
+"""Of the cost of the next best depth, `_APART_PX` or more away, to the best one's: so many times, and so much
+more besides."""
 
 _APART_PX = 3.0
 _LARGEST_STRETCH = 3.0
@@ -124,20 +130,19 @@ def measure_edges(grey: Grey, views: Sequence[EdgeView], camera: CameraModel) ->
     edges = _edges(grey, farthest, camera)
     if not len(edges):
         return None
-    most_px = float(edges.px_per_inverse_m.max()) / NEAREST_M
-    steps = int(np.clip(np.ceil(most_px / _STEP_PX), *_STEPS)) + 1
-    inverse = np.linspace(0.0, 1.0 / NEAREST_M, steps, dtype=np.float32)
+    inverse, near = _tried(float(edges.px_per_inverse_m.max()))
     cost, worst = _costs(grey, views, camera, edges, inverse)
     each = np.arange(len(edges))
     best = cost.argmin(axis=1)
-    step_px = edges.px_per_inverse_m * inverse[1]
-    elsewhere = np.abs(np.arange(steps)[None] - best[:, None]) * step_px[:, None] > _APART_PX
+    apart_px = np.abs(inverse - inverse[best][:, None]) * edges.px_per_inverse_m[:, None]
+    elsewhere = apart_px > _APART_PX
     second = np.where(elsewhere, cost, _NO_MATCH).min(axis=1)
-    found = (best + _between_steps(cost, best)) * inverse[1]
+    step = inverse[-1] - inverse[-2]
+    found = inverse[best] + _between_steps(cost, best) * step
     lowest = cost[each, best]
-    good = (lowest < _LARGEST_COST) & (second > _LEAST_RATIO * lowest)
+    good = (lowest < _LARGEST_COST) & (second > _LEAST_RATIO * lowest + _LEAST_LEAD)
     good &= worst[each, best] < _LARGEST_SINGLE_COST
-    good &= (best > 0) & (best < steps - 1) & (found > 1.0 / FARTHEST_M)
+    good &= (best > near) & (best < len(inverse) - 1)
     kept = np.flatnonzero(good)
     kept = kept[_borne_out(edges.row[kept], edges.column[kept], found[kept])]
     if not len(kept):
@@ -151,6 +156,20 @@ def measure_edges(grey: Grey, views: Sequence[EdgeView], camera: CameraModel) ->
         np.stack([x, y, np.ones_like(x)], axis=1) * depth_m[:, None],
         np.sqrt((_EDGE_SIGMA_PX / parallax_px) ** 2 + _MODEL_SIGMA**2 + baseline_sigma**2),
     )
+
+
+def _tried(most_px: float) -> tuple[Field, int]:
+    """(D,) inverse depths from 0 on, and which of them is `FARTHEST_M`'s.
+
+    Args:
+        most_px: that an edge moves by for each 1/m.
+    """
+    far = math.ceil(most_px / FARTHEST_M / _FAR_STEP_PX)
+    span = 1.0 / NEAREST_M - 1.0 / FARTHEST_M
+    near = min(math.ceil(most_px * span / _STEP_PX), _MOST_STEPS)
+    beyond = np.linspace(0.0, 1.0 / FARTHEST_M, far, endpoint=False)
+    within = np.linspace(1.0 / FARTHEST_M, 1.0 / NEAREST_M, near + 1)
+    return np.concatenate([beyond, within]).astype(np.float32), far
 
 
 def _edges(grey: Grey, motion: CameraMotion, camera: CameraModel) -> _Edges:
