@@ -253,7 +253,9 @@ class MotionPoints:
                 return None
             return self._rays(positions[self._times.index(at_ns)][tracks])
 
-        self._edges.measure(motion, points, seen_at)
+        if self._last_corners:
+            sigma = float(np.median(self.corners.relative_sigma))
+            self._edges.measure(motion, points, sigma, seen_at)
 
     def _confirm(self, captured_ns: int, motion: VehicleMotion) -> None:
         """See whether points that were measured earlier are where they were."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
 
@@ -100,6 +101,7 @@ class NearEdges:
         self,
         motion: VehicleMotion,
         anchors: NDArray[np.float64],
+        anchor_sigma: float,
         seen_at: Callable[[int], NDArray[np.float64] | None],
     ) -> None:
         """Measure the edges of the newest picture, into whose axes all were moved.
@@ -108,6 +110,7 @@ class NearEdges:
             motion: of the vehicle.
             anchors: (N, 3) points of known depth in its axes. By them the motion between two pictures becomes
                 as exact as edges need; where they do not agree with it, nothing is measured.
+            anchor_sigma: relative standard deviation of their depth, most of which they share.
             seen_at: (N, 2) normalised x, y at which the anchors were seen in the picture of that time, NaN
                 where one was not; None where none is known.
         """
@@ -116,7 +119,7 @@ class NearEdges:
         views = []
         for picture, moved in self._chosen(motion):
             seen = seen_at(picture[0])
-            corrected = None if seen is None else self._corrected(moved, anchors, seen, motion)
+            corrected = None if seen is None else self._corrected(moved, anchors, anchor_sigma, seen, motion)
             if corrected is not None:
                 views.append(EdgeView(picture[1], corrected))
         found = measure_edges(self._pictures[-1][1], views, self._straight)
@@ -178,6 +181,7 @@ class NearEdges:
         self,
         moved: CameraMotion,
         anchors: NDArray[np.float64],
+        anchor_sigma: float,
         seen: NDArray[np.float64],
         motion: VehicleMotion,
     ) -> CameraMotion | None:
@@ -194,7 +198,10 @@ class NearEdges:
         if found is None:
             return None
         rotation = found.rotation @ moved.rotation
-        return CameraMotion(rotation, moved.offset_m + found.offset_m @ rotation, moved.sigma_m)
+        # Points measured on the way into a hover tell its small baselines better than the velocity does.
+        by_anchors = math.hypot(found.offset_sigma_m, anchor_sigma * moved.baseline_m)
+        sigma_m = min(moved.sigma_m, by_anchors)
+        return CameraMotion(rotation, moved.offset_m + found.offset_m @ rotation, sigma_m)
 
     def _keep(self, kept: NDArray[np.bool_]) -> None:
         for name in ("_points", "_sigma", "_offset_sigma", "_measured_ns"):
