@@ -44,12 +44,12 @@ _LEAST_ALIGNED = 0.6
 """Of the gradient: an edge that moves along itself looks the same wherever it is."""
 
 _ACROSS = np.array([-1.0, 0.0, 1.0], np.float32)
-_ALONG = np.arange(-3.0, 4.0, dtype=np.float32)
+_ALONG = np.array([-3.0, -1.5, 0.0, 1.5, 3.0], np.float32)
 """Samples about an edge, pixels. Few across: what lies behind it moves otherwise."""
 
 _MARGIN_PX = 6
-_STEP_PX = 1.2
-_FAR_STEP_PX = 0.5
+_STEP_PX = 1.4
+_FAR_STEP_PX = 0.6
 """Between the depths that are tried. Those beyond `FARTHEST_M` are tried to be ruled out: of a facade's
 rows of windows each looks like the next, and the true one shows only where it fits exactly."""
 
