@@ -24,7 +24,8 @@ class MotionSettings(Section):
     edges: bool = Field(
         default=True,
         title="Measure near edges",
-        description="Measures edges within 8 m besides: posts, roofs and wires have no corners to follow.",
+        description="Measures edges within 8 m besides: posts, roofs and wires have no corners to follow. "
+        "Takes 10 ms more of one core, 11 times a second at most, after the picture's distances were sent.",
     )
     attitude_sigma_deg: float = Field(
         default=0.5,

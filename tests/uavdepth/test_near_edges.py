@@ -211,3 +211,28 @@ def test_rows_of_windows_far_away_are_not_told_near(far_m: float, apart_px: floa
         for b in baselines
     ]
     assert measure_edges(rows(0.0), views, CAMERA) is None
+
+
+@pytest.mark.parametrize("yaw_rad", [0.0, 0.3, 0.6, -0.6])
+def test_a_far_fence_is_not_told_near_while_the_vehicle_turns(yaw_rad: float) -> None:
+    """What is at the border is outside the other pictures: only others like it are to be found there."""
+    fence_m, period_m = 25.0, 1.5
+    baselines = (0.6, 0.4, 0.2)
+
+    def seen(east_m: float, yaw: float) -> NDArray[np.uint8]:
+        fine = CAMERA.scaled(CAMERA.width * 4, CAMERA.height)
+        turn = Attitude(0.0, 0.0, yaw).ned_from_body @ CameraMount().body_from_camera
+        rays = fine.normalized_rays.astype(np.float64) @ turn.T
+        east = east_m + fence_m / np.maximum(rays[..., 0], 0.05) * rays[..., 1]
+        grey = np.where(np.mod(east, period_m) < 0.5 * period_m, 60.0, 180.0).astype(np.float32)
+        size = CAMERA.width, CAMERA.height
+        return np.asarray(np.rint(cv2.resize(grey, size, interpolation=cv2.INTER_AREA)), np.uint8)
+
+    def moved(baseline: float, yaw: float) -> CameraMotion:
+        turned = Attitude(0.0, 0.0, yaw).ned_from_body
+        camera = CameraMount().body_from_camera
+        return CameraMotion((turned @ camera).T @ camera, np.array([baseline, 0.0, 0.0]), 0.01)
+
+    yaws = [yaw_rad * share for share in (1.0, 0.7, 0.4)]
+    views = [EdgeView(seen(-b, yaw), moved(b, yaw)) for b, yaw in zip(baselines, yaws, strict=True)]
+    assert measure_edges(seen(0.0, 0.0), views, CAMERA) is None

@@ -112,6 +112,10 @@ class _Edges:
     def __len__(self) -> int:
         return len(self.row)
 
+    def chosen(self, which: NDArray[np.bool_]) -> _Edges:
+        """Those of them."""
+        return _Edges(self.row[which], self.column[which], self.normal[which], self.px_per_inverse_m[which])
+
 
 def measure_edges(grey: Grey, views: Sequence[EdgeView], camera: CameraModel) -> MeasuredEdges | None:
     """Depth of the edges of a picture that lie within `FARTHEST_M`.
@@ -128,6 +132,7 @@ def measure_edges(grey: Grey, views: Sequence[EdgeView], camera: CameraModel) ->
         return None
     farthest = max(views, key=lambda view: view.motion.baseline_m).motion
     edges = _edges(grey, farthest, camera)
+    edges = edges.chosen(_infinity_seen(edges, views, camera) >= 2)
     if not len(edges):
         return None
     inverse, near = _tried(float(edges.px_per_inverse_m.max()))
@@ -201,6 +206,19 @@ def _edges(grey: Grey, motion: CameraMotion, camera: CameraModel) -> _Edges:
     normal = np.stack([right[row, column], down[row, column]], axis=1)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     return _Edges(row, column, normal, moves[row, column])
+
+
+def _infinity_seen(edges: _Edges, views: Sequence[EdgeView], camera: CameraModel) -> NDArray[np.int64]:
+    """(N,) in how many views each edge would be in the picture if it is far: else that is not ruled out."""
+    rays = camera.straightened(np.stack([edges.column, edges.row], axis=1))
+    rays = np.concatenate([rays, np.ones((len(rays), 1))], axis=1)
+    last = camera.width - 1 - _MARGIN_PX, camera.height - 1 - _MARGIN_PX
+    count = np.zeros(len(edges), np.int64)
+    for view in views:
+        pixels = camera.projected(rays @ view.motion.rotation.T)
+        with np.errstate(invalid="ignore"):
+            count += ((pixels >= _MARGIN_PX) & (pixels <= last)).all(axis=1)
+    return count
 
 
 def _costs(
