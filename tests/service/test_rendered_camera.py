@@ -76,6 +76,25 @@ def test_a_picture_that_takes_time_to_render_shows_the_moment_at_which_it_is_rea
     assert clock.now_ns() == frame.captured_ns
 
 
+class HeldUpLink(ForwardLink):
+    """What was heard last is 0.3 s old: the computer was held up."""
+
+    def newest_pose(self) -> Telemetry:
+        return self.telemetry_at(self.clock.now_ns() - 300_000_000)
+
+
+def test_an_old_pose_is_shown_as_it_was_and_not_carried_on() -> None:
+    clock = ManualClock(1_000_000_000)
+    link = ForwardLink(clock)
+    camera = rendered(clock, link, make_settings(), takes_s=0.04)
+    camera.read(1.0)
+    clock.advance_s(0.4)
+    camera._poses = HeldUpLink(clock)
+    frame = camera.read(1.0)
+    assert frame.captured_ns == 1_140_000_000
+    assert shade_of(frame.image_bgr) == 140
+
+
 def test_without_a_pose_the_rendered_camera_says_what_it_waits_for() -> None:
     clock = ManualClock()
     for link in (FakeLink(clock, attitude=None), FakeLink(clock, position_ned_m=None)):
