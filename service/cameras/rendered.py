@@ -74,7 +74,7 @@ class RenderedCamera(Camera):
         self._poses = poses
         self._scene: Scene | None = None
         self._due_ns = 0
-        self._last_pose_ns = -1
+        self._last_pose_ns = self._shown_ns = -1
         self._costs_ns: deque[int] = deque(maxlen=_REMEMBERED_COSTS)
         self._model = settings.model
 
@@ -104,25 +104,32 @@ class RenderedCamera(Camera):
         now_ns = self.clock.now_ns()
         self._costs_ns.append(now_ns - begun_ns)
         self._wait((pose.at_ns - now_ns) / 1e9)
+        self._shown_ns = pose.at_ns
         return self._frame(picture.image_bgr, pose.at_ns)
 
     def _pose_when_ready(self, newest: Telemetry, begun_ns: int) -> Telemetry:
         """The pose for the moment at which the picture will be ready, or the newest if that is too far."""
-        if not self._costs_ns:
-            return newest
-        cost_ns = sorted(self._costs_ns)[round(_USUALLY_READY * (len(self._costs_ns) - 1))]
-        ready_ns = begun_ns + min(cost_ns, _LONGEST_COST_NS)
-        if ready_ns - newest.at_ns > _LONGEST_AHEAD_NS:
+        ready_ns = self._ready_ns(begun_ns)
+        if not self._costs_ns or ready_ns - newest.at_ns > _LONGEST_AHEAD_NS:
             return newest
         pose = self._poses.predicted_pose(ready_ns)
         return newest if pose.position_ned_m is None or pose.attitude is None else pose
+
+    def _ready_ns(self, begun_ns: int) -> int:
+        """When a picture that is begun then is usually ready."""
+        if not self._costs_ns:
+            return begun_ns
+        cost_ns = sorted(self._costs_ns)[round(_USUALLY_READY * (len(self._costs_ns) - 1))]
+        return begun_ns + min(cost_ns, _LONGEST_COST_NS)
 
     def _fresh_pose(self, timeout_s: float) -> Telemetry:
         """A pose that is newer than the last picture's and whole."""
         end_ns = self.clock.now_ns() + round(timeout_s * 1e9)
         while True:
             newest = self._poses.newest_pose()
-            if newest.at_ns > self._last_pose_ns:
+            # An old one is shown as it was: not where the picture before has shown a later moment.
+            is_old = self._ready_ns(self.clock.now_ns()) - newest.at_ns > _LONGEST_AHEAD_NS
+            if newest.at_ns > (self._shown_ns if is_old else self._last_pose_ns):
                 pose = self._poses.telemetry_at(newest.at_ns)
                 if pose.position_ned_m is not None and pose.attitude is not None:
                     return pose

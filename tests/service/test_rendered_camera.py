@@ -77,10 +77,12 @@ def test_a_picture_that_takes_time_to_render_shows_the_moment_at_which_it_is_rea
 
 
 class HeldUpLink(ForwardLink):
-    """What was heard last is 0.3 s old: the computer was held up."""
+    """What was heard last is 0.3 s old: the computer was held up. Two milliseconds later comes the next."""
 
     def newest_pose(self) -> Telemetry:
-        return self.telemetry_at(self.clock.now_ns() - 300_000_000)
+        newest = self.telemetry_at(self.clock.now_ns() - 300_000_000)
+        self.clock.advance_s(0.002)
+        return newest
 
 
 def test_an_old_pose_is_shown_as_it_was_and_not_carried_on() -> None:
@@ -93,6 +95,19 @@ def test_an_old_pose_is_shown_as_it_was_and_not_carried_on() -> None:
     frame = camera.read(1.0)
     assert frame.captured_ns == 1_140_000_000
     assert shade_of(frame.image_bgr) == 140
+
+
+def test_after_being_held_up_no_picture_is_older_than_the_one_before() -> None:
+    clock = ManualClock(1_000_000_000)
+    camera = rendered(clock, ForwardLink(clock), make_settings(), takes_s=0.08)
+    camera.read(1.0)
+    shown_ns = camera.read(1.0).captured_ns
+    clock.advance_s(0.25)
+    camera._poses = HeldUpLink(clock)
+    assert camera._last_pose_ns < camera._poses.newest_pose().at_ns < shown_ns
+    frame = camera.read(1.0)
+    assert shown_ns < frame.captured_ns <= shown_ns + 2_000_000
+    assert shade_of(frame.image_bgr) == (frame.captured_ns - 1_000_000_000) // 1_000_000
 
 
 def test_without_a_pose_the_rendered_camera_says_what_it_waits_for() -> None:

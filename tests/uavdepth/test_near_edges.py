@@ -179,10 +179,11 @@ def test_one_view_and_too_short_a_baseline_measure_nothing() -> None:
     np.testing.assert_allclose(found.points[:, 2], POST_M, rtol=0.08)
 
 
-def test_a_picture_without_texture_measures_nothing() -> None:
-    plain = np.full((160, 320), 90, np.uint8)
+@pytest.mark.parametrize(("width", "height"), [(320, 160), (320, 6), (5, 160)])
+def test_a_picture_without_texture_or_room_measures_nothing(width: int, height: int) -> None:
+    plain = np.full((height, width), 90, np.uint8)
     views = [EdgeView(plain, CameraMotion(np.eye(3), np.array([b, 0.0, 0.0]), 0.01)) for b in (0.5, 0.3)]
-    assert measure_edges(plain, views, CAMERA) is None
+    assert measure_edges(plain, views, CAMERA.scaled(width, height)) is None
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -196,7 +196,7 @@ def _edges(grey: Grey, motion: CameraMotion, camera: CameraModel) -> _Edges:
     strength = np.where(usable, along, np.float32(0.0))
     rows, columns = height // _CELL_PX, width // _CELL_PX
     whole = strength[: rows * _CELL_PX, : columns * _CELL_PX].reshape(rows, _CELL_PX, columns, _CELL_PX)
-    cells = whole.transpose(0, 2, 1, 3).reshape(rows * columns, -1)
+    cells = whole.transpose(0, 2, 1, 3).reshape(rows * columns, _CELL_PX**2)
     strongest = cells.argmax(axis=1)
     value = cells[np.arange(len(cells)), strongest]
     chosen = np.flatnonzero(value > 0)
