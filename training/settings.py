@@ -146,7 +146,9 @@ def for_fine_tuning(settings: TrainingSettings) -> TrainingSettings:
     """The same for a run that begins with a trained network.
 
     Lower rates, the exported sizes from the start, and half as many changed surfaces: those teach what a
-    trained network lacks, but what it is measured by is the worlds as they are.
+    trained network lacks, but what it is measured by is the worlds as they are. Nothing stays frozen: the
+    encoder's first stages keep ImageNet's weights from what an untrained decoder would do to them, and a
+    trained one gets more out of them by teaching them too.
     """
     return replace(
         settings,
@@ -154,4 +156,5 @@ def for_fine_tuning(settings: TrainingSettings) -> TrainingSettings:
         decoder_rate=FINE_TUNING_RATE * settings.decoder_rate,
         encoder_rate=FINE_TUNING_RATE * settings.encoder_rate,
         appearance=AppearanceShares(*(share / 2 for share in astuple(settings.appearance))),
+        shape=replace(settings.shape, frozen_stages=0),
     )

@@ -52,7 +52,9 @@ def train(
     ] = None,
     fine_tune: Annotated[
         bool,
-        typer.Option(help="With --init: lower rates, full size, half as many changed surfaces."),
+        typer.Option(
+            help="With --init: lower rates, full size, half as many changed surfaces, nothing frozen."
+        ),
     ] = False,
     resume: Annotated[bool, typer.Option(help="Go on from the checkpoint in the run's folder.")] = False,
     seed: Annotated[

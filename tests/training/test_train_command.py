@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import torch
 import typer
 from frames import make_store
 from small_runs import PHASES, SMALL, settings
@@ -73,6 +74,11 @@ def test_the_command_trains_and_refuses_to_overwrite(
     assert tuned.encoder_rate < 0.5 * begun.encoder_rate
     assert tuned.appearance.photos == 0.5 * begun.appearance.photos
     assert tuned.phases == begun.phases[-1:]
+    before, after = (
+        Checkpoint.load(tmp_path / folder / "checkpoint.pt").averaged_network().encoder.stem
+        for folder in ("run", "finer")
+    )
+    assert not torch.equal(next(before.parameters()), next(after.parameters()))
     assert Checkpoint.load(tmp_path / "run" / "checkpoint.pt").images == 12
 
 
