@@ -15,6 +15,9 @@ from service.errors import ConfigError
 if TYPE_CHECKING:
     from service.flight_evaluation.evaluation import Evaluation
 
+_MOST_ROUNDS = 16
+"""Three validation worlds each of a scene: their seeds, 950 to 999, end where those of tests begin."""
+
 
 class DepthChoice(StrEnum):
     """Whose depth is flown with."""
@@ -39,6 +42,12 @@ def evaluate_flight(
     ] = None,
     corridors: Annotated[int | None, typer.Option(min=0, help="Corridors of all scenes together.")] = None,
     poses: Annotated[int | None, typer.Option(min=0, help="Random poses a scene, with exact depth.")] = None,
+    rounds: Annotated[
+        int,
+        typer.Option(
+            min=1, max=_MOST_ROUNDS, help="So many times as many poses, flights and turns, in other worlds."
+        ),
+    ] = 1,
     seed: Annotated[int, typer.Option(min=0, help="Of poses, flights and routes.")] = 1,
     latency_ms: Annotated[
         float, typer.Option(min=0.0, max=290.0, help="From exposure to the message's leaving.")
@@ -86,7 +95,7 @@ def evaluate_flight(
         validation=validation,
     )
     plan = quickly(plan) if quick else plan
-    plan = plan.changed(approaches=approaches, corridors=corridors, poses=poses)
+    plan = plan.repeated(rounds).changed(approaches=approaches, corridors=corridors, poses=poses)
     evaluation = Evaluation(plan)
     _run(evaluation)
     result = report(evaluation, machine_name(), today(), model_name(evaluation))

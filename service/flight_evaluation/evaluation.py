@@ -83,7 +83,7 @@ class Evaluation:
         approaches, corridors = plan.shared(plan.approaches), plan.shared(plan.corridors)
         worlds = len(plan.scenes) * plan.worlds
         for name, approach_count, corridor_count in zip(plan.scenes, approaches, corridors, strict=True):
-            specs = specs_of(name, plan.validation)[: plan.worlds]
+            specs = specs_of(name, plan.validation, plan.worlds)
             missing = [0, 0]
             counts = zip(
                 specs, plan.by_world(plan.poses), plan.by_world(plan.flights), plan.by_world(approach_count),

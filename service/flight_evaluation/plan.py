@@ -24,7 +24,7 @@ class EvaluationPlan:
         approaches, corridors: of all scenes together; an approach is flown by both autopilots, the corridors
             by them in turns.
         turns: flights a scene in which bearings are measured.
-        worlds: worlds of each scene: as drawn, under a low sun, in haze.
+        worlds: worlds of each scene, in turns as drawn, under a low sun, in haze.
         sigma_factor: `[scan] sigma_factor`; None: its default.
         validation: in worlds that choices are made by, not in those of tests.
     """
@@ -53,6 +53,16 @@ class EvaluationPlan:
             approaches=self.approaches if approaches is None else approaches,
             corridors=self.corridors if corridors is None else corridors,
             poses=self.poses if poses is None else poses,
+        )
+
+    def repeated(self, rounds: int) -> EvaluationPlan:
+        """So many times as many poses, flights and turns, in so many times as many worlds."""
+        return replace(
+            self,
+            poses=self.poses * rounds,
+            flights=self.flights * rounds,
+            turns=self.turns * rounds,
+            worlds=self.worlds * rounds,
         )
 
     def shared(self, total: int) -> tuple[int, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import itertools
 import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -83,7 +84,14 @@ def lit(description: SceneDescription, light: Light) -> SceneDescription:
     return description
 
 
-def specs_of(name: str, validation: bool = False) -> tuple[WorldSpec, ...]:
-    """The test worlds of one scene, or its validation worlds: a seed for each light."""
+def specs_of(name: str, validation: bool = False, count: int = len(Light)) -> tuple[WorldSpec, ...]:
+    """The test worlds of one scene, or its validation worlds: each another seed, in the lights by turns.
+
+    Raises:
+        ValueError: more validation worlds than there are seeds before those of tests.
+    """
     first = _FIRST_FLOWN_VALIDATION_SEED if validation else _FIRST_FLOWN_TEST_SEED
-    return tuple(WorldSpec(name, first + i, light) for i, light in enumerate(Light))
+    if validation and first + count > FIRST_TEST_SEED:
+        raise ValueError(f"{count} validation worlds: there are {FIRST_TEST_SEED - first}")
+    lights = itertools.cycle(Light)
+    return tuple(WorldSpec(name, first + number, next(lights)) for number in range(count))

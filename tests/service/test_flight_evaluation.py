@@ -134,6 +134,13 @@ class TestPlan:
         for name in ("poses", "flights", "approaches", "corridors", "turns", "worlds"):
             assert 0 < getattr(less, name) < getattr(plan, name)
 
+    def test_rounds_are_more_of_everything_open_in_more_worlds(self) -> None:
+        plan, more = EvaluationPlan(), EvaluationPlan().repeated(3)
+        for name in ("poses", "flights", "turns", "worlds"):
+            assert getattr(more, name) == 3 * getattr(plan, name)
+        assert (more.approaches, more.corridors) == (plan.approaches, plan.corridors)
+        assert len(more.by_world(more.flights)) == 9
+
 
 class TestWorlds:
     def test_wires_are_for_the_test_alone(self) -> None:
@@ -150,6 +157,15 @@ class TestWorlds:
             specs = specs_of(name, validation=True)
             assert {spec.light for spec in specs} == set(Light)
             assert all(900 <= spec.seed < 1000 for spec in specs)
+
+    def test_more_worlds_begin_with_the_same_ones_and_never_reach_those_of_tests(self) -> None:
+        specs = specs_of("city", validation=True, count=48)
+        assert specs[:3] == specs_of("city", validation=True)
+        assert len({spec.seed for spec in specs}) == 48
+        assert max(spec.seed for spec in specs) < 1000
+        assert [spec.light for spec in specs[3:6]] == list(Light)
+        with pytest.raises(ValueError, match="51 validation worlds: there are 50"):
+            specs_of("city", validation=True, count=51)
 
     def test_wires_stand_across_the_way_in_the_height_band(self) -> None:
         scene = WorldSpec("wires", 1100).load()
