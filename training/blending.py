@@ -39,7 +39,11 @@ def blend(checkpoints: Sequence[Checkpoint], shares: Sequence[float]) -> Checkpo
         raise CheckpointError(f"the shares are {list(shares)}: above 0 and together 1 is needed")
     last = checkpoints[-1]
     for other in checkpoints[:-1]:
-        if other.settings.shape != last.settings.shape:
+        # Which stages a run had frozen changes no weight's shape.
+        if (
+            replace(other.settings.shape, frozen_stages=last.settings.shape.frozen_stages)
+            != last.settings.shape
+        ):
             raise CheckpointError(
                 f"networks of different shapes have no mean: {other.settings.shape} and {last.settings.shape}"
             )

@@ -92,53 +92,50 @@ class RenderedCamera(Camera):
         if self._scene is None:
             raise CameraError(f"camera {self.name}: not open")
         self._wait((self._due_ns - self.clock.now_ns()) / 1e9)
-        newest = self._fresh_pose(timeout_s)
-        begun_ns = self.clock.now_ns()
+        pose, begun_ns = self._pose_to_show(timeout_s)
         # A late picture does not make the following ones hurry.
         self._due_ns = max(self._due_ns, begun_ns) + round(1e9 / self.settings.fps)
-        self._last_pose_ns = newest.at_ns
-        pose = self._pose_when_ready(newest, begun_ns)
         if pose.position_ned_m is None or pose.attitude is None:
             raise CameraError(f"camera {self.name}: a pose without position or attitude")
         picture = self._scene.render(self._model, self._mount, pose.position_ned_m, pose.attitude)
         now_ns = self.clock.now_ns()
         self._costs_ns.append(now_ns - begun_ns)
         self._wait((pose.at_ns - now_ns) / 1e9)
-        self._shown_ns = pose.at_ns
         return self._frame(picture.image_bgr, pose.at_ns)
 
-    def _pose_when_ready(self, newest: Telemetry, begun_ns: int) -> Telemetry:
-        """The pose for the moment at which the picture will be ready, or the newest if that is too far."""
-        ready_ns = self._ready_ns(begun_ns)
-        if not self._costs_ns or ready_ns - newest.at_ns > _LONGEST_AHEAD_NS:
-            return newest
-        pose = self._poses.predicted_pose(ready_ns)
-        return newest if pose.position_ned_m is None or pose.attitude is None else pose
-
-    def _ready_ns(self, begun_ns: int) -> int:
-        """When a picture that is begun then is usually ready."""
-        if not self._costs_ns:
-            return begun_ns
-        cost_ns = sorted(self._costs_ns)[round(_USUALLY_READY * (len(self._costs_ns) - 1))]
-        return begun_ns + min(cost_ns, _LONGEST_COST_NS)
-
-    def _fresh_pose(self, timeout_s: float) -> Telemetry:
-        """A pose that is newer than the last picture's and whole."""
+    def _pose_to_show(self, timeout_s: float) -> tuple[Telemetry, int]:
+        """A whole pose, heard and shown later than the last picture's, and when it was found."""
         end_ns = self.clock.now_ns() + round(timeout_s * 1e9)
         while True:
             newest = self._poses.newest_pose()
-            # An old one is shown as it was: not where the picture before has shown a later moment.
-            is_old = self._ready_ns(self.clock.now_ns()) - newest.at_ns > _LONGEST_AHEAD_NS
-            if newest.at_ns > (self._shown_ns if is_old else self._last_pose_ns):
-                pose = self._poses.telemetry_at(newest.at_ns)
-                if pose.position_ned_m is not None and pose.attitude is not None:
-                    return pose
-            if self.clock.now_ns() >= end_ns:
+            begun_ns = self.clock.now_ns()
+            if newest.at_ns > self._last_pose_ns:
+                pose = self._pose_when_ready(self._poses.telemetry_at(newest.at_ns), begun_ns)
+                # After a stall a pose is shown as it was, and the last picture may have shown a later one.
+                if _is_whole(pose) and pose.at_ns > self._shown_ns:
+                    self._last_pose_ns, self._shown_ns = newest.at_ns, pose.at_ns
+                    return pose, begun_ns
+            if begun_ns >= end_ns:
                 raise CameraTimeoutError(
                     f"camera {self.name}: waits for the autopilot's position and attitude "
                     "(LOCAL_POSITION_NED, ATTITUDE)"
                 )
             self._wait(_POLL_S)
 
+    def _pose_when_ready(self, newest: Telemetry, begun_ns: int) -> Telemetry:
+        """The pose for the moment at which the picture will be ready, or the newest if that is too far."""
+        if not self._costs_ns or not _is_whole(newest):
+            return newest
+        cost_ns = sorted(self._costs_ns)[round(_USUALLY_READY * (len(self._costs_ns) - 1))]
+        ready_ns = begun_ns + min(cost_ns, _LONGEST_COST_NS)
+        if ready_ns - newest.at_ns > _LONGEST_AHEAD_NS:
+            return newest
+        pose = self._poses.predicted_pose(ready_ns)
+        return pose if _is_whole(pose) else newest
+
     def close(self) -> None:
         self._due_ns = 0
+
+
+def _is_whole(pose: Telemetry) -> bool:
+    return pose.position_ned_m is not None and pose.attitude is not None

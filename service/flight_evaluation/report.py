@@ -48,6 +48,7 @@ def report(evaluation: Evaluation, machine: str, date: str, model: str) -> dict[
         "frames_per_s": camera.fps,
         "speed_of_approaches_mps": 3.0,
         "seeds": "validation" if plan.validation else "test",
+        "worlds_of_each_scene": plan.worlds,
         "worlds": [str(light) for light in _lights(evaluation)],
         "scenes": scenes,
         "all": everything,

@@ -68,6 +68,12 @@ def test_shares_that_make_no_mean_are_refused(
         blend(runs, shares)
 
 
+def test_runs_with_other_frozen_stages_have_a_mean(runs: tuple[Checkpoint, Checkpoint]) -> None:
+    first, second = runs
+    tuned = replace(second, settings=replace(second.settings, shape=replace(SMALL, frozen_stages=0)))
+    assert blend((first, tuned), (0.5, 0.5)).settings == tuned.settings
+
+
 def test_networks_of_different_shapes_are_refused(runs: tuple[Checkpoint, Checkpoint]) -> None:
     first, second = runs
     other = replace(second, settings=replace(second.settings, shape=replace(SMALL, head_channels=8)))
