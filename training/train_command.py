@@ -31,7 +31,7 @@ def train(
     seeds: Annotated[int, typer.Option(min=1, max=900, help="How many worlds of each scene to render.")] = 60,
     first_seed: Annotated[int, typer.Option(min=0, max=899, help="Seed of the first of them.")] = 0,
     scenes: Annotated[str, typer.Option(help="Scenes to render, by commas.")] = (
-        "city,suburb,park,mountain,forest,wall"
+        "city,suburb,farm,park,mountain,forest,wall"
     ),
     frames_per_seed: Annotated[int, typer.Option(min=1, help="Frames rendered of each world.")] = 24,
     thin_share: Annotated[

@@ -24,7 +24,7 @@ class CameraSettings(Section):
         description='`"0"` (number of a USB/V4L2 camera, or a path such as `"/dev/video0"`), '
         "path of a video file, path of a folder of pictures, "
         '`"rtsp://..."`, or `"sim:SCENE[:SEED]"`, a rendered world seen from the pose that the autopilot '
-        "reports (`mountain`, `city`, `wall`, `forest`, `park`, `suburb`, `works`).",
+        "reports (`mountain`, `city`, `wall`, `forest`, `park`, `suburb`, `farm`, `works`).",
     )
     width: int = Field(
         default=640,

@@ -26,7 +26,7 @@ from training.data.frame_store import NewFrame, read_frames, write_frames
 from training.data.pose_sampling import SAFE_CLEARANCE_M, sample_poses
 from training.data.rendering import RenderPlan, render_plan
 from training.data.seed_split import SeedSplit
-from training.data.thin_approach import thin_rays
+from training.data.thin_approach import THIN_DISTANCE_M, thin_rays
 from training.errors import TrainingDataError
 from training.normalization import MAX_DEPTH_M, depth_from_output, log_inverse_depth
 from uavdepth.attitude import Attitude
@@ -200,9 +200,11 @@ def test_pictures_of_thin_things_are_taken_right_before_them_and_clear_of_them()
     near = sample_poses(world, np.random.default_rng(3), 40, thin_share=1.0)
     assert min(world.clearance_m(position.tolist()) for position, _ in near) >= SAFE_CLEARANCE_M
     # An upright look meets a post somewhat above or below the vehicle; level it is nearer still.
-    assert max(seen_from(world, near)) < 10.5
+    distances = np.array(seen_from(world, near))
+    assert distances.max() < THIN_DISTANCE_M[1] + 0.5
+    assert 0.15 < np.mean(distances > 8.0) < 0.6, "log-uniform: neither only near nor only far"
     elsewhere = [(place, Attitude(0.0, 0.0, yaw)) for place, yaw in anywhere(40)]
-    assert np.mean(np.array(seen_from(world, elsewhere)) < 10.5) < 0.3
+    assert np.median(seen_from(world, elsewhere)) > 2.0 * np.median(distances)
 
 
 def anywhere(count: int) -> list[tuple[NDArray[np.float64], float]]:

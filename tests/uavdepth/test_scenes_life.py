@@ -20,7 +20,7 @@ from uavdepth.scenes.mesh import Mesh
 SEED = 1
 SNOWY = 4
 """A suburb in winter."""
-NAMES = ("city", "park", "suburb", "wall", "works")
+NAMES = ("city", "farm", "park", "suburb", "wall", "works")
 
 
 def _build(name: str) -> SceneDescription:
@@ -60,7 +60,7 @@ def test_a_seed_is_one_world_and_fits_a_renderer(name: str) -> None:
     assert np.isfinite(first.mesh.vertices_m).all()
 
 
-@pytest.mark.parametrize("name", ["city", "park", "suburb", "works"])
+@pytest.mark.parametrize("name", ["city", "farm", "park", "suburb", "works"])
 def test_people_stand_on_the_ground_of_their_world(name: str) -> None:
     world = _built(name)
     trousers = _part(world.mesh, "denim").reshape(-1, 3).astype(float)

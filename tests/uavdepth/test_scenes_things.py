@@ -27,6 +27,7 @@ from uavdepth.scenes.shelters import add_bus_shelter, add_covered_walk, add_stal
 from uavdepth.scenes.solids import Rect
 from uavdepth.scenes.stamps import Stamps
 from uavdepth.scenes.textures import TEXTURES
+from uavdepth.scenes.trellises import add_hoops, add_hop_garden, add_low_cables, add_trellis, add_wire_fence
 
 Box = NDArray[np.float64]
 
@@ -143,6 +144,22 @@ def test_the_wires_of_a_line_reach_from_the_first_pole_to_the_last_above_head_he
     assert vertices[:, 1].max() > 59.9
 
 
+@pytest.mark.parametrize("make", [add_trellis, add_low_cables])
+@pytest.mark.parametrize("seed", range(6))
+def test_wires_of_a_farm_run_at_the_heights_of_vehicles_from_post_to_post(
+    make: Callable[..., None], seed: int
+) -> None:
+    first, last = np.zeros(3), np.array([0.0, 24.0, 0.0])
+    vertices = _built(lambda builder, rng: make(builder, rng, first, last), seed).vertices_m
+    reach = vertices[np.abs(vertices[:, 0]) < 0.8, 1]
+    assert reach.max() > 23.0
+    assert reach.min() < 1.0
+    levels = -vertices[:, 2]
+    assert 1.4 < levels.max() <= 8.01
+    wires = (levels > 0.3) & (levels < levels.max() - 0.02)
+    assert len(np.unique(np.round(vertices[wires, 1]))) > 8, "between the posts too"
+
+
 def test_bars_have_their_radius_ends_and_outward_faces() -> None:
     mesh = _built(lambda builder, _: add_bars(builder, (1.0, 2.0, 0.0), (1.0, 2.0, -3.0), 0.1, sides=6))
     np.testing.assert_allclose(np.hypot(*(mesh.vertices_m[:, :2] - [1.0, 2.0]).T), 0.1, rtol=1e-5)
@@ -209,8 +226,16 @@ def test_a_hedge_has_its_height_and_width() -> None:
         lambda builder, rng: add_silo(builder, rng, 0.0, 0.0, 2.0),
         lambda builder, rng: add_pipe_bridge(builder, rng, (0.0, 0.0), (30.0, 0.0), 4.5),
         lambda builder, rng: add_containers(builder, rng, Rect(0.0, 20.0, 0.0, 20.0)),
+        lambda builder, rng: add_hop_garden(builder, rng, Rect(0.0, 20.0, 0.0, 20.0)),
+        lambda builder, rng: add_hoops(builder, rng, Rect(0.0, 20.0, 0.0, 7.0)),
+        lambda builder, rng: add_wire_fence(
+            builder, rng, [(0.0, 0.0, 0.0), (20.0, 0.0, 0.0), (20.0, 20.0, 0.0)]
+        ),
     ],
-    ids=["tower", "gantry", "mast", "stall", "shelter", "tank", "silo", "pipes", "containers"],
+    ids=[
+        *["tower", "gantry", "mast", "stall", "shelter", "tank", "silo", "pipes", "containers"],
+        *["hops", "hoops", "pasture"],
+    ],
 )
 def test_large_things_stand_on_the_ground_in_known_textures_and_few_triangles(
     make: Callable[[MeshBuilder, np.random.Generator], None],

@@ -20,7 +20,10 @@ from uavdepth.scenes.path_growth import CLEARANCE_M
 
 NORTH = (1.0, 0.0, 0.0)
 DOWN = (0.0, 0.0, 1.0)
-WORLDS = [("city", 0), ("city", 3), ("wall", 0), ("wall", 4), ("suburb", 1), ("suburb", 2), ("works", 0)]
+WORLDS = [
+    *[("city", 0), ("city", 3), ("wall", 0), ("wall", 4), ("suburb", 1), ("suburb", 2)],
+    *[("farm", 8), ("works", 0)],
+]
 CAMERA = CameraModel.from_fov(96, 64, 80)
 
 
@@ -106,7 +109,9 @@ def test_every_surface_of_the_picture_has_texture(scene: Scene) -> None:
     assert (blocks[near] > 1.5).mean() > 0.9
 
 
-@pytest.mark.parametrize(("name", "seed", "other_seed"), [("city", 0, 3), ("wall", 0, 4), ("suburb", 1, 2)])
+@pytest.mark.parametrize(
+    ("name", "seed", "other_seed"), [("city", 0, 3), ("wall", 0, 4), ("suburb", 1, 2), ("farm", 8, 0)]
+)
 def test_the_same_seed_is_the_same_picture_and_another_seed_is_another(
     name: str, seed: int, other_seed: int
 ) -> None:

@@ -23,9 +23,9 @@ from training.data.views import View, view_of_crop
 from training.errors import TrainingDataError
 from training.normalization import IMAGE_MEAN, IMAGE_STD, MAX_DEPTH_M, log_inverse_depth
 
-SCENE_SHARES: Mapping[str, float] = {"city": 2.5}
-"""How often scenes are drawn against each other, 1 if not named: streets hold the finest obstacles and the
-most kinds of them."""
+SCENE_SHARES: Mapping[str, float] = {"city": 2.5, "farm": 2.5}
+"""How often scenes are drawn against each other, 1 if not named: streets hold the most kinds of fine
+obstacles, and farms the most wires and poles."""
 
 _ENOUGH_FRAMES = 300
 """A scene with fewer is drawn less, in proportion: it would be learnt by heart."""

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from uavdepth.attitude import Attitude
 
-THIN_DISTANCE_M = (1.2, 10.0)
-"""How far before the thing the vehicle is, log-uniform: a pole at 3 m is where a turn comes too late."""
+THIN_DISTANCE_M = (1.2, 20.0)
+"""How far before the thing the vehicle is, log-uniform: a pole at 3 m is where a turn comes too late,
+and a network that saw thin things only there would tell every one there."""
 
 THICKEST_M = 0.5
 """Trunks and lamp posts are thin, people and letter boxes are not."""

@@ -10,7 +10,7 @@ from uavdepth.scenes.heap import trim_heap
 from uavdepth.scenes.picture import RenderedPicture
 from uavdepth.scenes.scene import Scene
 
-SCENE_NAMES = ("mountain", "city", "wall", "forest", "park", "suburb", "works")
+SCENE_NAMES = ("mountain", "city", "wall", "forest", "park", "suburb", "farm", "works")
 """Worlds that `load_scene` knows; each is the module of that name in this package."""
 
 HELD_OUT_SCENES = ("works",)
