@@ -20,8 +20,9 @@ from training.normalization import FOCAL_REFERENCE_PX
 NEAR_TRUTH_M = 20.0
 """Depth within which obstacles count most: a vehicle at 10 m/s needs that much to stop."""
 
-THIN_END_M = 100.0
-"""Depth from which on a thin thing counts like anything else."""
+THIN_SPAN_M = (40.0, 200.0)
+"""Depth up to which a thin thing counts in full, and from which on like anything else. Where the weight
+falls, what is not sure of its distance is told too near: that must not be where a scan looks."""
 
 FAR_UNCERTAINTY = 0.35
 """Relative error that sky counts with when sigma is taught: "at least 200 m" is no distance, and this is how
@@ -47,8 +48,7 @@ class LossWeights:
         near: of a pixel nearer than `NEAR_TRUTH_M`; others count 1.
         thin: times the above, of a pixel of a pole, wire, twig or railing: one pixel in a hundred, and most
             of the scan's missed elements. A network that is not sure whether a pixel is of the twig or of
-            the wood behind has to choose the twig. It falls to 1 between `NEAR_TRUTH_M` and `THIN_END_M`:
-            where it ended at once, thin things beyond were told too near.
+            the wood behind has to choose the twig. It falls to 1 along `THIN_SPAN_M`.
         hinted: of a picture with any hint in the absolute terms; one without counts 1, because its metres
             can only be guessed.
         sigma_quantile: share of errors that are to be below sigma: 0.683 as for a normal distribution, and
@@ -109,7 +109,8 @@ def pixel_weights(batch: Batch, weights: LossWeights) -> Tensor:
     """(N, 1, H, W) how much each pixel counts."""
     depth_m = torch.exp(-batch.log_inverse_depth) * (batch.focal_px / FOCAL_REFERENCE_PX)[:, None, None, None]
     near = torch.where(depth_m < NEAR_TRUTH_M, weights.near, 1.0)
-    nearness = (torch.log(THIN_END_M / depth_m) / math.log(THIN_END_M / NEAR_TRUTH_M)).clamp(0.0, 1.0)
+    full_m, end_m = THIN_SPAN_M
+    nearness = (torch.log(end_m / depth_m) / math.log(end_m / full_m)).clamp(0.0, 1.0)
     thin = torch.where(thin_things(batch.log_inverse_depth), weights.thin**nearness, 1.0)
     return torch.where(batch.far, weights.far, near * thin)
 

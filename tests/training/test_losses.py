@@ -12,7 +12,7 @@ from training.data.batches import Batch
 from training.losses import (
     FAR_UNCERTAINTY,
     NEAR_TRUTH_M,
-    THIN_END_M,
+    THIN_SPAN_M,
     LossWeights,
     absolute_term,
     depth_loss,
@@ -115,16 +115,15 @@ def test_thin_is_a_share_of_the_picture() -> None:
 def test_what_is_thin_and_near_counts_most() -> None:
     depth_m = torch.full((64, 128), 19.0)
     depth_m[:, 20] = 5.0
-    depth_m[:, 80:] = 90.0
-    depth_m[:, 100] = 20.0001
-    depth_m[:, 110] = math.sqrt(NEAR_TRUTH_M * THIN_END_M)
-    depth_m[:, 121:] = 180.0
-    depth_m[:, 125] = 120.0
+    depth_m[:, 80:] = 290.0
+    depth_m[:, 100] = THIN_SPAN_M[0]
+    depth_m[:, 110] = math.sqrt(math.prod(THIN_SPAN_M))
+    depth_m[:, 125] = 210.0
     truth = torch.log(1.0 / depth_m)[None, None]
     sky = torch.zeros_like(truth, dtype=torch.bool)
     weight = pixel_weights(batch_of(truth, sky), LossWeights(near=1.5, thin=8.0))[0, 0, 0]
     assert weight[[10, 20, 90]].tolist() == pytest.approx([1.5, 12.0, 1.0])
-    # It does not end at once, or what is thin and beyond would be told too near: half its power half way.
+    # It does not end where a scan looks, or what is thin would be told too near: half its power half way.
     assert weight[[100, 110, 125]].tolist() == pytest.approx([8.0, math.sqrt(8.0), 1.0], rel=1e-3)
 
 
