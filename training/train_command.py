@@ -60,6 +60,10 @@ def train(
     seed: Annotated[
         int | None, typer.Option(help="Seed of random weights and of the order of pictures; 0 if not given.")
     ] = None,
+    thin_weight: Annotated[
+        float | None,
+        typer.Option(min=1.0, help="How often a pixel of poles, wires and twigs counts; 8 if not given."),
+    ] = None,
     photos: Annotated[
         Path | None,
         typer.Option(help="Folder of photographs (PNG, JPEG) to lay on rendered surfaces now and then."),
@@ -77,7 +81,7 @@ def train(
         raise TrainingSettingsError(f"--init {init} and --resume: a run goes on or starts, not both")
     if fine_tune and init is None:
         raise TrainingSettingsError("--fine-tune needs --init: a run on a trained network")
-    settings = _settings_maker(minutes, images, seed, precision, fine_tune)
+    settings = _settings_maker(minutes, images, seed, precision, fine_tune, thin_weight)
     if render:
         _render(data, scenes, range(first_seed, first_seed + seeds), frames_per_seed, thin_share)
     with needs_extra("train", "train"):
@@ -116,7 +120,12 @@ SettingsMaker = Callable[["TrainingSettings | None"], "TrainingSettings"]
 
 
 def _settings_maker(
-    minutes: float | None, images: int | None, seed: int | None, precision: str, fine_tune: bool = False
+    minutes: float | None,
+    images: int | None,
+    seed: int | None,
+    precision: str,
+    fine_tune: bool = False,
+    thin_weight: float | None = None,
 ) -> SettingsMaker:
     """How to get a run's settings, from those of its checkpoint if it goes on."""
     if minutes is not None and images is not None:
@@ -130,11 +139,18 @@ def _settings_maker(
         if previous is None:
             length = DEFAULT_MINUTES if minutes is None and images is None else minutes
             new = TrainingSettings(images=images, minutes=length, seed=seed or 0, precision=precision)
+            if thin_weight is not None:
+                new = replace(new, loss=replace(new.loss, thin=thin_weight))
             return for_fine_tuning(new) if fine_tune else new
         if seed is not None and seed != previous.seed:
             raise TrainingSettingsError(
                 f"--seed is {seed}, but the run was started with {previous.seed}: other pictures would "
                 "follow; leave it out, or start a new run with --output"
+            )
+        if thin_weight is not None and thin_weight != previous.loss.thin:
+            raise TrainingSettingsError(
+                f"--thin-weight is {thin_weight:g}, but the run was started with {previous.loss.thin:g}: it "
+                "would be taught otherwise half way; leave it out, or start a new run with --output"
             )
         if minutes is None and images is None:
             return replace(previous, precision=precision)

@@ -59,6 +59,8 @@ def test_the_command_trains_and_refuses_to_overwrite(
         CliRunner().invoke(app, words, catch_exceptions=False)
     with pytest.raises(TrainingSettingsError, match="--seed is 5, but the run was started with 0"):
         CliRunner().invoke(app, [*words, "--resume", "--seed", "5"], catch_exceptions=False)
+    with pytest.raises(TrainingSettingsError, match="--thin-weight is 3, but the run was started with 8"):
+        CliRunner().invoke(app, [*words, "--resume", "--thin-weight", "3"], catch_exceptions=False)
     longer = [*words[:-1], "12", "--resume"]
     assert CliRunner().invoke(app, longer, catch_exceptions=False).exit_code == 0
 
@@ -66,10 +68,10 @@ def test_the_command_trains_and_refuses_to_overwrite(
         CliRunner().invoke(app, [*words, "--fine-tune"], catch_exceptions=False)
     begun = Checkpoint.load(tmp_path / "run" / "checkpoint.pt").settings
     finer = [*words, "--output", str(tmp_path / "finer"), "--fine-tune"]
-    finer += ["--init", str(tmp_path / "run" / "checkpoint.pt")]
+    finer += ["--init", str(tmp_path / "run" / "checkpoint.pt"), "--thin-weight", "4"]
     assert CliRunner().invoke(app, finer, catch_exceptions=False).exit_code == 0
     tuned = Checkpoint.load(tmp_path / "finer" / "checkpoint.pt").settings
-    assert tuned == for_fine_tuning(replace(begun, images=8))
+    assert tuned == for_fine_tuning(replace(begun, images=8, loss=replace(begun.loss, thin=4.0)))
     assert tuned.decoder_rate < 0.5 * begun.decoder_rate
     assert tuned.encoder_rate < 0.5 * begun.encoder_rate
     assert tuned.appearance.photos == 0.5 * begun.appearance.photos
