@@ -45,6 +45,12 @@ def evaluate(
         Path | None,
         typer.Option(help="Folder where rendered frames are kept: a broken-off run goes on there."),
     ] = None,
+    other_surfaces: Annotated[
+        bool,
+        typer.Option(
+            help="Lay patterns and filters on most pictures: what a network owes to the renderer's materials."
+        ),
+    ] = False,
     kitti: Annotated[
         Path | None,
         typer.Option(help="Measure on KITTI raw data in this folder instead: DATE/DRIVE/image_02/data."),
@@ -81,11 +87,11 @@ def evaluate(
 
     counts = parse_points(points or (_DEFAULT_POINTS if kitti is None else _DEFAULT_KITTI_POINTS))
     if kitti is None:
-        plan = _plan(scenes, seeds, frames_per_seed, data)
+        plan = _plan(scenes, seeds, frames_per_seed, data, other_surfaces)
         network = DepthModel.load(model, provider, threads, precision=precision)
         result = evaluate_rendered(network, plan, counts)
     else:
-        if any(option is not None for option in (scenes, seeds, frames_per_seed, data)):
+        if other_surfaces or any(option is not None for option in (scenes, seeds, frames_per_seed, data)):
             raise EvaluationError("--kitti has no scenes, seeds or rendered frames: give one or the other")
         network = DepthModel.load(model, provider, threads, precision=precision)
         result = evaluate_kitti(network, kitti, counts, every)
@@ -106,14 +112,22 @@ def parse_points(text: str) -> tuple[int, ...]:
 
 
 def _plan(
-    scenes: str | None, seeds: str | None, frames_per_seed: int | None, data: Path | None
+    scenes: str | None,
+    seeds: str | None,
+    frames_per_seed: int | None,
+    data: Path | None,
+    other_surfaces: bool,
 ) -> EvaluationPlan:
     from training.evaluation_frames import EvaluationPlan, parse_seeds
     from uavdepth.scenes import SCENE_NAMES
 
     names = SCENE_NAMES if scenes is None else [name.strip() for name in scenes.split(",") if name.strip()]
     return EvaluationPlan(
-        tuple(names), parse_seeds(seeds or _DEFAULT_SEEDS), frames_per_seed or _DEFAULT_FRAMES, data
+        tuple(names),
+        parse_seeds(seeds or _DEFAULT_SEEDS),
+        frames_per_seed or _DEFAULT_FRAMES,
+        data,
+        other_surfaces,
     )
 
 

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+
+import numpy as np
 
 from training.data.frame_store import FrameRecord, NewFrame, read_frames, write_frames
 from training.data.rendering import render_world
 from training.data.seed_split import SeedSplit
+from training.data.surface_patterns import AppearanceShares, change_surfaces
 from training.errors import EvaluationError
 from uavdepth.scenes import HELD_OUT_SCENES, SCENE_NAMES, load_scene
+
+OTHER_SURFACES = AppearanceShares(patterns=0.7, filters=0.5, photos=0.0)
+"""How many pictures get patterns and filters where surfaces are to look otherwise."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +40,8 @@ class EvaluationPlan:
         seeds: of each scene; all kept for tests, or all kept for validation.
         frames_per_seed: frames of each world.
         store: folder where rendered frames are kept for the next time, or None.
+        other_surfaces: most pictures get patterns laid on their surfaces, or a random filter, each always the
+            same: what a network still sees then, it does not owe to the renderer's materials.
 
     Raises:
         EvaluationError: an unknown scene, nothing to do, seeds of training, or seeds of two splits.
@@ -43,6 +52,7 @@ class EvaluationPlan:
     seeds: Sequence[int]
     frames_per_seed: int
     store: Path | None = None
+    other_surfaces: bool = False
 
     def __post_init__(self) -> None:
         for scene in self.scenes:
@@ -102,6 +112,8 @@ class EvaluationPlan:
                 else:
                     frames = self._render(scene, seed)
                 for index, frame in enumerate(frames):
+                    if self.other_surfaces:
+                        frame = _with_other_surfaces(frame, (zlib.crc32(scene.encode()), seed, index))
                     yield EvaluationFrame(scene, seed, index, frame)
 
     def _render(self, scene: str, seed: int) -> list[NewFrame]:
@@ -111,6 +123,12 @@ class EvaluationPlan:
             root = Path(folder) if self.store is None else self.store
             write_frames(root, scene, seed, frames)
             return [_load(record) for record in _by_world(root)[scene, seed]]
+
+
+def _with_other_surfaces(frame: NewFrame, number: tuple[int, int, int]) -> NewFrame:
+    rng = np.random.default_rng(number)
+    changed = change_surfaces(rng, frame.image_bgr, frame.depth_m, frame.camera, OTHER_SURFACES)
+    return replace(frame, image_bgr=changed)
 
 
 def _by_world(root: Path) -> dict[tuple[str, int], list[FrameRecord]]:

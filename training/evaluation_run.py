@@ -55,12 +55,14 @@ def evaluate_rendered(model: DepthModel, plan: EvaluationPlan, point_counts: Seq
     data = (
         f"rendered frames of {plan.split.name.lower()} seeds {_ranges(plan.seeds)} of "
         f"{', '.join(plan.scenes)}, depth below {DEPTH_CAP_M:g} m"
+        f"{', surfaces changed' if plan.other_surfaces else ''}"
     )
     details = {
         "split": plan.split.name.lower(),
         "scenes": list(plan.scenes),
         "seeds": list(plan.seeds),
         "frames_per_seed": plan.frames_per_seed,
+        "other_surfaces": plan.other_surfaces,
     }
     parts = {SEEN: plan.seen_scenes, HELD_OUT: plan.held_out_scenes}
     note = "" if plan.split is SeedSplit.TEST else "validation seeds: for choices, not for claims"

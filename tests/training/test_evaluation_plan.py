@@ -65,6 +65,19 @@ def test_a_world_measures_the_same_whether_it_was_stored_or_not(
         assert np.array_equal(item.frame.depth_m, unstored.frame.depth_m)
 
 
+def test_other_surfaces_are_the_same_every_time_and_change_no_depth(tmp_path: Path) -> None:
+    make_store(tmp_path, (("city", 1000),))
+    plain = EvaluationPlan(("city",), (1000,), 4, tmp_path)
+    first, again = (list(replace(plain, other_surfaces=True).frames()) for _ in range(2))
+    changed = 0
+    for before, one, two in zip(plain.frames(), first, again, strict=True):
+        assert np.array_equal(one.frame.image_bgr, two.frame.image_bgr)
+        assert np.array_equal(one.frame.depth_m, before.frame.depth_m)
+        changed += not np.array_equal(one.frame.image_bgr, before.frame.image_bgr)
+    assert changed >= 2
+    assert any(not np.array_equal(one.frame.image_bgr, first[0].frame.image_bgr) for one in first[1:])
+
+
 def test_a_stored_picture_of_another_size_is_named(tmp_path: Path) -> None:
     make_store(tmp_path, (("city", 1000),))
     cv2.imwrite(str(tmp_path / "city-001000" / "0001.jpg"), np.zeros((10, 20, 3), np.uint8))
