@@ -80,21 +80,12 @@ def build(seed: int) -> SceneDescription:
             middle = Rect(_FIELD_M * i, _FIELD_M * i, _FIELD_M * j, _FIELD_M * j)
             land = middle.shrunk(-0.5 * (_FIELD_M - _TRACK_M))
             corners = (land.north_low_m, land.east_low_m), (land.north_high_m, land.east_high_m)
-            if farm.corridor.is_free(*corners) and not _overlap(land, taken):
+            if farm.corridor.is_free(*corners) and not land.overlaps(taken):
                 field(farm, land)
     _add_borders(farm)
     _add_movers(farm)
     weather = draw_weather(rng, (0.0005, 0.006))
     return weather.over(builder.build(), level_ground, _REACH_M - 15.0)
-
-
-def _overlap(first: Rect, second: Rect) -> bool:
-    return (
-        first.north_low_m < second.north_high_m
-        and second.north_low_m < first.north_high_m
-        and first.east_low_m < second.east_high_m
-        and second.east_low_m < first.east_high_m
-    )
 
 
 def _add_ground(farm: _Farm) -> None:

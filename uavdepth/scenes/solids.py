@@ -36,6 +36,15 @@ class Rect:
             self.north_low_m + by_m, self.north_high_m - by_m, self.east_low_m + by_m, self.east_high_m - by_m
         )
 
+    def overlaps(self, other: Rect) -> bool:
+        """Whether any of its ground is the other's too."""
+        return (
+            self.north_low_m < other.north_high_m
+            and other.north_low_m < self.north_high_m
+            and self.east_low_m < other.east_high_m
+            and other.east_low_m < self.east_high_m
+        )
+
     @property
     def corners(self) -> list[Point]:
         """Corners in a ring."""

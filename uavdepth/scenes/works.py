@@ -71,22 +71,13 @@ def build(seed: int) -> SceneDescription:
             cell = Rect(middle[0] - side, middle[0] + side, middle[1] - side, middle[1] + side)
             part = parts[int(rng.choice(len(parts), p=shares / shares.sum()))]
             corners = (cell.north_low_m, cell.east_low_m), (cell.north_high_m, cell.east_high_m)
-            if yard.corridor.is_free(*corners) and not _overlap(cell, taken):
+            if yard.corridor.is_free(*corners) and not cell.overlaps(taken):
                 part(yard, cell)
     _add_pipes(yard)
     _add_movers(yard)
     _add_border(yard)
     weather = draw_weather(rng, (0.0006, 0.007))
     return weather.over(builder.build(), level_ground, _REACH_M - 15.0)
-
-
-def _overlap(first: Rect, second: Rect) -> bool:
-    return (
-        first.north_low_m < second.north_high_m
-        and second.north_low_m < first.north_high_m
-        and first.east_low_m < second.east_high_m
-        and second.east_low_m < first.east_high_m
-    )
 
 
 def _add_ground(yard: _Yard) -> None:
