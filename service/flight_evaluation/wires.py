@@ -9,7 +9,7 @@ from uavdepth.scenes.description import SceneDescription
 from uavdepth.scenes.fences import add_fence
 from uavdepth.scenes.mesh import MeshBuilder
 from uavdepth.scenes.overhead import add_mast
-from uavdepth.scenes.solids import Rect, add_slab
+from uavdepth.scenes.plots import add_patches, patch_lines
 from uavdepth.scenes.terrain import level_ground
 from uavdepth.scenes.weather import draw_weather
 
@@ -28,11 +28,8 @@ def build(seed: int) -> SceneDescription:
     rng = np.random.default_rng([seed, 0x317E])
     builder = MeshBuilder()
     ground = str(rng.choice(["grass", "gravel", "asphalt", "soil"]))
-    lines = np.concatenate([[-_HORIZON_M], np.arange(-_HALF_M, _HALF_M + 1, 16.0), [_HORIZON_M]])
-    for i in range(len(lines) - 1):
-        for j in range(len(lines) - 1):
-            rect = Rect(lines[i], lines[i + 1], lines[j], lines[j + 1])
-            add_slab(builder, rect, 0.0, ground, np.full(3, rng.uniform(0.85, 1.1)))
+    lines = patch_lines(_HALF_M, 16.0, _HORIZON_M)
+    add_patches(builder, lines, lambda _: (ground, np.full(3, rng.uniform(0.85, 1.1))))
     for north_m in np.arange(-_HALF_M + 10.0, _HALF_M, _ROW_M):
         _add_row(builder, rng, float(north_m + rng.uniform(-2.0, 2.0)))
     weather = draw_weather(rng, (0.0005, 0.004))

@@ -13,6 +13,7 @@ from uavdepth.scenes.city_life import CityPlan, House, add_city_life
 from uavdepth.scenes.copies import Template, add_copies
 from uavdepth.scenes.description import SceneDescription
 from uavdepth.scenes.mesh import MeshBuilder
+from uavdepth.scenes.plots import add_patches, patch_lines
 from uavdepth.scenes.solids import Rect, add_slab, add_wall
 from uavdepth.scenes.street_furniture import add_lamp, add_sign, add_small_thing
 from uavdepth.scenes.street_grid import (
@@ -93,12 +94,8 @@ def build(seed: int) -> SceneDescription:
 
 def _add_ground(town: _Town) -> None:
     """Asphalt in slabs of changing shade, so that the plane is not one tone."""
-    lines = np.concatenate([[-_HORIZON_M], np.arange(-REACH_M - 60, REACH_M + 61, 14.0), [_HORIZON_M]])
-    shade = town.rng.uniform(0.85, 1.1)
-    for i in range(len(lines) - 1):
-        for j in range(len(lines) - 1):
-            rect = Rect(lines[i], lines[i + 1], lines[j], lines[j + 1])
-            add_slab(town.builder, rect, 0.0, "asphalt", np.full(3, shade * town.rng.uniform(0.9, 1.1)))
+    lines, shade = patch_lines(REACH_M + 60.0, 14.0, _HORIZON_M), town.rng.uniform(0.85, 1.1)
+    add_patches(town.builder, lines, lambda _: ("asphalt", np.full(3, shade * town.rng.uniform(0.9, 1.1))))
 
 
 def _tree_template(rng: np.random.Generator, kind: TreeKind, autumn: float) -> Template:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from uavdepth.scenes.buildings import add_house
 from uavdepth.scenes.cars import PAINTS_BGR
@@ -20,7 +19,8 @@ from uavdepth.scenes.mesh import MeshBuilder
 from uavdepth.scenes.overhead import add_line, add_mast
 from uavdepth.scenes.people import Crowd
 from uavdepth.scenes.plant_parts import add_hall, add_heap, add_silo
-from uavdepth.scenes.solids import Rect, add_slab
+from uavdepth.scenes.plots import PlotPlan, Site, add_patches, fill_plots, patch_lines
+from uavdepth.scenes.solids import Rect
 from uavdepth.scenes.stamps import Stamps
 from uavdepth.scenes.terrain import level_ground
 from uavdepth.scenes.trellises import (
@@ -45,10 +45,7 @@ _TREES: tuple[TreeKind, ...] = ("broadleaf", "bare", "birch", "poplar", "conifer
 
 
 @dataclass(frozen=True)
-class _Farm:
-    rng: np.random.Generator
-    builder: MeshBuilder
-    corridor: Corridor
+class _Farm(Site):
     tree: TreeKind
     autumn: float
 
@@ -70,18 +67,11 @@ def build(seed: int) -> SceneDescription:
     farm = _Farm(rng, builder, Corridor(end_m, front_depth_m=8.0), tree, autumn)
     _add_ground(farm)
     taken = _add_front(farm, end_m)
-    fields: Sequence[Callable[[_Farm, Rect], None]] = (
-        _vineyard, _hops, _cables, _pasture, _orchard, _tunnels, _masts, _yard, _ploughed
+    fields = (
+        (_vineyard, 0.14), (_hops, 0.1), (_cables, 0.26), (_pasture, 0.14), (_orchard, 0.08),
+        (_tunnels, 0.06), (_masts, 0.1), (_yard, 0.06), (_ploughed, 0.06),
     )  # fmt: skip
-    shares = np.array([0.14, 0.1, 0.26, 0.14, 0.08, 0.06, 0.1, 0.06, 0.06])
-    for i in range(-_FIELDS, _FIELDS + 1):
-        for j in range(-_FIELDS, _FIELDS + 1):
-            field = fields[int(rng.choice(len(fields), p=shares / shares.sum()))]
-            middle = Rect(_FIELD_M * i, _FIELD_M * i, _FIELD_M * j, _FIELD_M * j)
-            land = middle.shrunk(-0.5 * (_FIELD_M - _TRACK_M))
-            corners = (land.north_low_m, land.east_low_m), (land.north_high_m, land.east_high_m)
-            if farm.corridor.is_free(*corners) and not land.overlaps(taken):
-                field(farm, land)
+    fill_plots(farm, PlotPlan(_FIELDS, _FIELD_M, _TRACK_M), fields, taken)
     _add_borders(farm)
     _add_movers(farm)
     weather = draw_weather(rng, (0.0005, 0.006))
@@ -91,15 +81,13 @@ def build(seed: int) -> SceneDescription:
 def _add_ground(farm: _Farm) -> None:
     """Fields of grass, soil or stubble, each of its own tint, and the land around."""
     rng = farm.rng
-    lines = np.concatenate(
-        [[-_HORIZON_M], np.arange(-_REACH_M, _REACH_M + 1.0, 0.5 * _FIELD_M), [_HORIZON_M]]
-    )
     kinds = rng.choice(_SOILS, size=3)
-    for i in range(len(lines) - 1):
-        for j in range(len(lines) - 1):
-            rect = Rect(lines[i], lines[i + 1], lines[j], lines[j + 1])
-            tint = rng.uniform(0.8, 1.15) * rng.uniform(0.95, 1.05, 3)
-            add_slab(farm.builder, rect, 0.0, str(kinds[int(rng.integers(3))]), tint)
+
+    def look(_: bool) -> tuple[str, ArrayLike]:
+        tint = rng.uniform(0.8, 1.15) * rng.uniform(0.95, 1.05, 3)
+        return str(kinds[int(rng.integers(3))]), tint
+
+    add_patches(farm.builder, patch_lines(_REACH_M, 0.5 * _FIELD_M, _HORIZON_M), look)
 
 
 def _add_front(farm: _Farm, end_m: float) -> Rect:

@@ -6,6 +6,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from uavdepth.scenes.buildings import add_house
 from uavdepth.scenes.cars import CarPark
@@ -15,6 +16,7 @@ from uavdepth.scenes.cottages import Lot, add_lot
 from uavdepth.scenes.description import SceneDescription
 from uavdepth.scenes.groves import plant, tree_template
 from uavdepth.scenes.mesh import MeshBuilder
+from uavdepth.scenes.plots import add_patches, patch_lines
 from uavdepth.scenes.solids import Point, Rect, add_slab, add_wall
 from uavdepth.scenes.street_furniture import add_lamp, add_small_thing
 from uavdepth.scenes.street_grid import (
@@ -71,14 +73,13 @@ def build(seed: int) -> SceneDescription:
 
 
 def _add_ground(builder: MeshBuilder, rng: np.random.Generator, snowy: bool) -> None:
-    lines = np.concatenate([[-_HORIZON_M], np.arange(-REACH_M - 60, REACH_M + 61, 15.0), [_HORIZON_M]])
     shade = rng.uniform(0.9, 1.15)
-    for i in range(len(lines) - 1):
-        for j in range(len(lines) - 1):
-            far = i in (0, len(lines) - 2) or j in (0, len(lines) - 2)
-            texture = ("snow" if snowy else "grass") if far else "asphalt"
-            tint = np.full(3, shade * rng.uniform(0.9, 1.1) * (1.5 if snowy and not far else 1.0))
-            add_slab(builder, Rect(lines[i], lines[i + 1], lines[j], lines[j + 1]), 0.0, texture, tint)
+
+    def look(outermost: bool) -> tuple[str, ArrayLike]:
+        texture = ("snow" if snowy else "grass") if outermost else "asphalt"
+        return texture, np.full(3, shade * rng.uniform(0.9, 1.1) * (1.5 if snowy and not outermost else 1.0))
+
+    add_patches(builder, patch_lines(REACH_M + 60.0, 15.0, _HORIZON_M), look)
 
 
 def _add_block(

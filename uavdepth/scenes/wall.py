@@ -11,7 +11,8 @@ from uavdepth.scenes.fences import FENCE_KINDS, add_fence
 from uavdepth.scenes.mesh import MeshBuilder
 from uavdepth.scenes.overhead import add_line, add_mast
 from uavdepth.scenes.people import Crowd
-from uavdepth.scenes.solids import Rect, add_box, add_slab
+from uavdepth.scenes.plots import add_patches, patch_lines
+from uavdepth.scenes.solids import add_box
 from uavdepth.scenes.street_furniture import add_lamp, add_sign, add_small_thing
 from uavdepth.scenes.terrain import level_ground
 from uavdepth.scenes.undergrowth import add_bush
@@ -32,11 +33,8 @@ def build(seed: int) -> SceneDescription:
     north_m = float(rng.uniform(31.0, 44.0))
     height_m = 3.0 * int(rng.integers(3, 7))
     ground = str(rng.choice(_GROUNDS))
-    lines = np.concatenate([[-_HORIZON_M], np.arange(-_HALF_M, _HALF_M + 1, 12.0), [_HORIZON_M]])
-    for i in range(len(lines) - 1):
-        for j in range(len(lines) - 1):
-            rect = Rect(lines[i], lines[i + 1], lines[j], lines[j + 1])
-            add_slab(builder, rect, 0.0, ground, np.full(3, rng.uniform(0.85, 1.1)))
+    lines = patch_lines(_HALF_M, 12.0, _HORIZON_M)
+    add_patches(builder, lines, lambda _: (ground, np.full(3, rng.uniform(0.85, 1.1))))
     half = float(rng.uniform(20.0, 70.0))
     tint = rng.uniform(0.8, 1.1) * rng.uniform(0.93, 1.07, 3)
     texture = str(rng.choice(_WALLS))

@@ -5,10 +5,8 @@ No training data are drawn from it: it shows how a network copes with a kind of 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-
 import numpy as np
+from numpy.typing import ArrayLike
 
 from uavdepth.scenes.bars import add_wires
 from uavdepth.scenes.cars import PAINTS_BGR, CarPark
@@ -29,8 +27,9 @@ from uavdepth.scenes.plant_parts import (
     add_silo,
     add_tank,
 )
+from uavdepth.scenes.plots import PlotPlan, Site, add_patches, fill_plots, patch_lines
 from uavdepth.scenes.scaffolding import add_scaffold
-from uavdepth.scenes.solids import Rect, add_box, add_slab
+from uavdepth.scenes.solids import Rect, add_box
 from uavdepth.scenes.stamps import Stamps
 from uavdepth.scenes.terrain import level_ground
 from uavdepth.scenes.weather import draw_weather
@@ -43,36 +42,21 @@ _REACH_M = (_CELLS + 0.5) * _CELL_M
 _HORIZON_M = 700.0
 
 
-@dataclass(frozen=True)
-class _Yard:
-    rng: np.random.Generator
-    builder: MeshBuilder
-    corridor: Corridor
-
-
 def build(seed: int) -> SceneDescription:
     """The works of one seed: a hall ends the view to the north."""
     rng = np.random.default_rng([seed, 0x3042])
     builder = MeshBuilder()
     end_m = float(rng.uniform(33.0, 43.0))
-    yard = _Yard(rng, builder, Corridor(end_m, half_width_m=4.5, front_depth_m=10.0))
+    yard = Site(rng, builder, Corridor(end_m, half_width_m=4.5, front_depth_m=10.0))
     _add_ground(yard)
     half = float(rng.uniform(18.0, 30.0))
     add_hall(builder, rng, Rect(end_m, end_m + 16.0, -half, half), float(rng.uniform(9.5, 13.0)), True)
     taken = Rect(end_m - 2.0, end_m + 18.0, -half - 2.0, half + 2.0)
-    parts: Sequence[Callable[[_Yard, Rect], None]] = (
-        _hall, _tanks, _silos, _containers, _gantry, _platforms, _heaps, _parking, _substation, _scaffolded
+    parts = (
+        (_hall, 0.16), (_tanks, 0.12), (_silos, 0.1), (_containers, 0.16), (_gantry, 0.08), (_platforms, 0.1),
+        (_heaps, 0.08), (_parking, 0.08), (_substation, 0.06), (_scaffolded, 0.06),
     )  # fmt: skip
-    shares = np.array([0.16, 0.12, 0.1, 0.16, 0.08, 0.1, 0.08, 0.08, 0.06, 0.06])
-    for i in range(-_CELLS, _CELLS + 1):
-        for j in range(-_CELLS, _CELLS + 1):
-            middle = (_CELL_M * i + rng.uniform(-2.0, 2.0), _CELL_M * j)
-            side = 0.5 * (_CELL_M - _ROAD_M)
-            cell = Rect(middle[0] - side, middle[0] + side, middle[1] - side, middle[1] + side)
-            part = parts[int(rng.choice(len(parts), p=shares / shares.sum()))]
-            corners = (cell.north_low_m, cell.east_low_m), (cell.north_high_m, cell.east_high_m)
-            if yard.corridor.is_free(*corners) and not cell.overlaps(taken):
-                part(yard, cell)
+    fill_plots(yard, PlotPlan(_CELLS, _CELL_M, _ROAD_M, jitter_m=2.0), parts, taken)
     _add_pipes(yard)
     _add_movers(yard)
     _add_border(yard)
@@ -80,20 +64,19 @@ def build(seed: int) -> SceneDescription:
     return weather.over(builder.build(), level_ground, _REACH_M - 15.0)
 
 
-def _add_ground(yard: _Yard) -> None:
+def _add_ground(yard: Site) -> None:
     """Patches of concrete, asphalt and gravel."""
     rng = yard.rng
-    lines = np.concatenate([[-_HORIZON_M], np.arange(-_REACH_M, _REACH_M + 1.0, 15.0), [_HORIZON_M]])
     kinds = rng.choice(["concrete", "asphalt", "gravel"], size=3)
-    for i in range(len(lines) - 1):
-        for j in range(len(lines) - 1):
-            far = i in (0, len(lines) - 2) or j in (0, len(lines) - 2)
-            texture = "grass" if far else str(kinds[int(rng.integers(3))])
-            rect = Rect(lines[i], lines[i + 1], lines[j], lines[j + 1])
-            add_slab(yard.builder, rect, 0.0, texture, np.full(3, rng.uniform(0.85, 1.05)))
+
+    def look(outermost: bool) -> tuple[str, ArrayLike]:
+        texture = "grass" if outermost else str(kinds[int(rng.integers(3))])
+        return texture, np.full(3, rng.uniform(0.85, 1.05))
+
+    add_patches(yard.builder, patch_lines(_REACH_M, 15.0, _HORIZON_M), look)
 
 
-def _hall(yard: _Yard, cell: Rect) -> None:
+def _hall(yard: Site, cell: Rect) -> None:
     rng = yard.rng
     add_hall(yard.builder, rng, cell.shrunk(float(rng.uniform(0.0, 3.0))), float(rng.uniform(5.5, 14.0)))
 
@@ -106,7 +89,7 @@ def _grid(cell: Rect, rows: int) -> list[tuple[float, float]]:
     return [(float(north), float(east)) for north in norths for east in easts]
 
 
-def _tanks(yard: _Yard, cell: Rect) -> None:
+def _tanks(yard: Site, cell: Rect) -> None:
     rng = yard.rng
     rows = int(rng.integers(1, 3))
     for north, east in _grid(cell, rows):
@@ -118,18 +101,18 @@ def _tanks(yard: _Yard, cell: Rect) -> None:
         add_box(yard.builder, middle, size, 0.0, 0.9, "concrete")
 
 
-def _silos(yard: _Yard, cell: Rect) -> None:
+def _silos(yard: Site, cell: Rect) -> None:
     rng = yard.rng
     for north, east in _grid(cell, int(rng.integers(2, 4))):
         if rng.random() < 0.75:
             add_silo(yard.builder, rng, north, east, float(rng.uniform(1.5, 2.6)))
 
 
-def _containers(yard: _Yard, cell: Rect) -> None:
+def _containers(yard: Site, cell: Rect) -> None:
     add_containers(yard.builder, yard.rng, cell)
 
 
-def _gantry(yard: _Yard, cell: Rect) -> None:
+def _gantry(yard: Site, cell: Rect) -> None:
     rng = yard.rng
     north = float(rng.uniform(cell.north_low_m + 3.0, cell.north_high_m - 3.0))
     clear = float(rng.uniform(5.0, 10.0))
@@ -151,7 +134,7 @@ def _gantry(yard: _Yard, cell: Rect) -> None:
         )
 
 
-def _platforms(yard: _Yard, cell: Rect) -> None:
+def _platforms(yard: Site, cell: Rect) -> None:
     rng = yard.rng
     for north, east in _grid(cell, 2):
         half = rng.uniform(2.5, 4.2, 2)
@@ -159,12 +142,12 @@ def _platforms(yard: _Yard, cell: Rect) -> None:
         add_platform(yard.builder, rng, plot, float(rng.uniform(3.0, 6.5)))
 
 
-def _heaps(yard: _Yard, cell: Rect) -> None:
+def _heaps(yard: Site, cell: Rect) -> None:
     for north, east in _grid(cell, 2):
         add_heap(yard.builder, yard.rng, north, east)
 
 
-def _parking(yard: _Yard, cell: Rect) -> None:
+def _parking(yard: Site, cell: Rect) -> None:
     cars = CarPark(yard.rng)
     for north in np.arange(cell.north_low_m + 2.5, cell.north_high_m, 2.8):
         for east in (cell.east_low_m + 3.0, cell.east_high_m - 3.0):
@@ -173,7 +156,7 @@ def _parking(yard: _Yard, cell: Rect) -> None:
     cars.build(yard.builder)
 
 
-def _substation(yard: _Yard, cell: Rect) -> None:
+def _substation(yard: Site, cell: Rect) -> None:
     """Transformers behind a fence, wires between portals."""
     rng, builder = yard.rng, yard.builder
     ring = cell.corners
@@ -192,7 +175,7 @@ def _substation(yard: _Yard, cell: Rect) -> None:
     add_wires(builder, starts, ends, 0.03)
 
 
-def _scaffolded(yard: _Yard, cell: Rect) -> None:
+def _scaffolded(yard: Site, cell: Rect) -> None:
     """A block under repair."""
     rng = yard.rng
     plot = cell.shrunk(3.0)
@@ -204,7 +187,7 @@ def _scaffolded(yard: _Yard, cell: Rect) -> None:
             add_scaffold(yard.builder, rng, start, end, out, 0.0, height)
 
 
-def _add_pipes(yard: _Yard) -> None:
+def _add_pipes(yard: Site) -> None:
     """Pipe bridges along roads between the cells; they stay out of the corridor."""
     rng = yard.rng
     for _ in range(int(rng.integers(2, 6))):
@@ -217,7 +200,7 @@ def _add_pipes(yard: _Yard) -> None:
             add_pipe_bridge(yard.builder, rng, start, end, float(rng.uniform(3.8, 6.5)))
 
 
-def _add_movers(yard: _Yard) -> None:
+def _add_movers(yard: Site) -> None:
     """Lorries, fork-lifts and people on the roads."""
     rng = yard.rng
     lorries = Stamps(rng, [lorry] * 3, {"paint": PAINTS_BGR})
@@ -244,7 +227,7 @@ def _add_movers(yard: _Yard) -> None:
     crowd.build(yard.builder)
 
 
-def _add_border(yard: _Yard) -> None:
+def _add_border(yard: Site) -> None:
     """A fence around everything, a line beside it, masts on the roads' corners."""
     rng, builder = yard.rng, yard.builder
     edge = _REACH_M - 1.0
